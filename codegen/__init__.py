@@ -1,0 +1,1 @@
+"""Turns a model into C, compiles it and loads it."""

@@ -1,0 +1,126 @@
+"""Reading tables from CSV files whose header names every column with its unit: ``mass [kg]``."""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import DataError, suggestion
+
+_HEADER = re.compile(r"^\s*(?P<name>[^\[\]]+?)\s*\[(?P<unit>[^\[\]]*)\]\s*$")
+
+
+@dataclass(frozen=True)
+class CsvTable:
+    """Columns of a CSV file by name, with the line number of each row for messages."""
+
+    file: Path
+    units: dict[str, str]
+    columns: dict[str, NDArray[np.float64]]
+    lines: tuple[int, ...]
+
+    def column(self, name: str, unit: str) -> NDArray[np.float64]:
+        """Return a column after checking its unit.
+
+        Raises
+        ------
+        DataError
+            If the column is missing or its unit is another one.
+        """
+        if name not in self.columns:
+            raise DataError(f"column '{name} [{unit}]' is missing{suggestion(name, self.columns)}", file=self.file)
+        if self.units[name] != unit:
+            raise DataError(
+                f"unit is [{self.units[name]}], expected [{unit}]; convert the values and the header",
+                file=self.file,
+                column=name,
+            )
+        return self.columns[name]
+
+    def require_positive(self, name: str, allow_zero: bool = False) -> None:
+        """Refuse values that a physical quantity cannot have."""
+        values = self.columns[name]
+        bad = values < 0 if allow_zero else values <= 0
+        if bad.any():
+            i = int(np.argmax(bad))
+            raise DataError(
+                f"{values[i]:g} is not {'allowed below zero' if allow_zero else 'positive'}; correct the value",
+                file=self.file,
+                column=name,
+                row=self.lines[i],
+            )
+
+
+def read_csv_table(file: Path, argument: str, unit: str) -> CsvTable:
+    """Read a table whose argument column increases from row to row.
+
+    Parameters
+    ----------
+    file : Path
+        Lines that start with ``#`` are comments (provenance).
+    argument, unit : str
+        Name and unit of the argument column, such as 'time', 's'.
+
+    Raises
+    ------
+    DataError
+        Missing file, header without units, a cell that is not a finite number, rows out of order or repeated.
+    """
+    try:
+        text = file.read_text(encoding="utf-8-sig")
+    except OSError as error:
+        raise DataError(f"cannot be read ({error.strerror or error}); check the name in the TOML file", file=file) from None
+    except UnicodeDecodeError:
+        raise DataError("is not UTF-8 text; save it as CSV", file=file) from None
+    rows = [
+        (number, cells)
+        for number, cells in enumerate(csv.reader(text.splitlines()), start=1)
+        if cells and any(c.strip() for c in cells) and not cells[0].lstrip().startswith("#")
+    ]
+    if len(rows) < 3:
+        raise DataError("needs a header and at least two rows", file=file)
+    (header_line, header), body = rows[0], rows[1:]
+    names, units = [], {}
+    for cell in header:
+        match = _HEADER.match(cell)
+        if not match:
+            raise DataError(
+                f"header '{cell.strip()}' has no unit; write it as 'name [unit]', [1] if it has none",
+                file=file,
+                row=header_line,
+            )
+        name = match["name"]
+        if name in units:
+            raise DataError("stands twice in the header", file=file, column=name, row=header_line)
+        names.append(name)
+        units[name] = match["unit"].strip()
+    data = np.empty((len(body), len(names)))
+    for i, (line, cells) in enumerate(body):
+        if len(cells) != len(names):
+            raise DataError(f"has {len(cells)} cells where the header has {len(names)}", file=file, row=line)
+        for j, cell in enumerate(cells):
+            try:
+                data[i, j] = float(cell)
+            except ValueError:
+                data[i, j] = math.nan
+            if not math.isfinite(data[i, j]):
+                raise DataError(
+                    f"'{cell.strip()}' is not a finite number; fill the cell or remove the row",
+                    file=file,
+                    column=names[j],
+                    row=line,
+                )
+    table = CsvTable(file, units, {n: data[:, j] for j, n in enumerate(names)}, tuple(line for line, _ in body))
+    x = table.column(argument, unit)
+    steps = np.diff(x)
+    if not (steps > 0).all():
+        i = int(np.argmin(steps > 0))
+        why = "repeats the row above" if steps[i] == 0 else f"comes after {x[i]:g}"
+        raise DataError(f"{x[i + 1]:g} {why}; sort the rows and keep each once", file=file, column=argument, row=table.lines[i + 1])
+    return table

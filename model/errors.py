@@ -1,0 +1,100 @@
+"""Typed errors and warnings: each says where, why and what to do about it."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from pathlib import Path
+
+
+class AscentwindError(Exception):
+    """Base of every error that ascentwind raises on purpose."""
+
+
+class DataError(AscentwindError):
+    """A vehicle file holds something that cannot be used.
+
+    Parameters
+    ----------
+    why : str
+        What is wrong and what to do about it.
+    file : path, optional
+    column : str, optional
+        Column of a table or key of a TOML file.
+    row : int, optional
+        Line number in the file, counted from 1 as an editor does.
+    time : float, optional
+        Flight time in seconds.
+    """
+
+    def __init__(
+        self,
+        why: str,
+        *,
+        file: str | Path | None = None,
+        column: str | None = None,
+        row: int | None = None,
+        time: float | None = None,
+    ):
+        self.why, self.file, self.column, self.row, self.time = why, file, column, row, time
+        where = [str(file)] if file is not None else []
+        if column is not None:
+            where.append(f"column '{column}'")
+        if row is not None:
+            where.append(f"line {row}")
+        if time is not None:
+            where.append(f"t = {time:g} s")
+        super().__init__(f"{', '.join(where)}: {why}" if where else why)
+
+
+class TimeRangeError(AscentwindError):
+    """A time was asked for that the flight or its tables do not cover."""
+
+
+class DirectNoiseError(AscentwindError):
+    """White noise reaches an output directly, so that its variance would be infinite."""
+
+
+class NonlinearSystemError(AscentwindError):
+    """An expression given for a linear system is not linear in its states and inputs."""
+
+
+class SingularCouplingError(AscentwindError):
+    """The mass matrix that couples bending and slosh cannot be inverted."""
+
+
+class IntegrationError(AscentwindError):
+    """An integrator gave up before the end of the interval."""
+
+
+class OutputFolderError(AscentwindError):
+    """Results cannot be written where they were asked for."""
+
+
+class UnknownNameError(AscentwindError):
+    """A name is not known; the nearest valid one is offered."""
+
+    def __init__(self, kind: str, name: str, known: Iterable[str]):
+        self.kind, self.name, self.known = kind, name, tuple(known)
+        super().__init__(f"there is no {kind} '{name}'{suggestion(name, self.known)}")
+
+
+class AscentwindWarning(UserWarning):
+    """Base of every warning that ascentwind gives."""
+
+
+class UnstableSystemWarning(AscentwindWarning):
+    """The closed loop, frozen at some time, has a root in the right half plane."""
+
+
+class ExtrapolationWarning(AscentwindWarning):
+    """Values beyond the end of a table were needed and held constant."""
+
+
+def suggestion(name: str, known: Iterable[str]) -> str:
+    """Return '; did you mean ...?' or a short list of what is known."""
+    known = list(known)
+    near = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
+    if near:
+        return f"; did you mean '{near[0]}'?"
+    return f"; known: {', '.join(known[:12])}{', ...' if len(known) > 12 else ''}" if known else ""

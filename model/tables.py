@@ -1,0 +1,202 @@
+"""Tables over flight time or altitude as piecewise cubic polynomials, evaluated together in one lookup.
+
+A table group holds all tables that share one argument. Their polynomials are written on the union of their
+knots, so that one search and one Horner scheme give all of them. Knots and coefficients are run-time numbers:
+changing a table value needs no new code, only the number of knots and tables is structure.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import casadi as ca
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import CubicSpline, PchipInterpolator, PPoly
+
+from .errors import DataError
+
+ORDER = 4  # coefficients of a cubic
+INTERPOLATIONS = ("cubic", "pchip", "linear", "step")
+
+
+@dataclass(frozen=True)
+class Table:
+    """One quantity over one argument.
+
+    Parameters
+    ----------
+    name, unit : str
+    argument : (n,) array
+        Increasing sample points.
+    values : (n,) array
+    interpolation : {'cubic', 'pchip', 'linear', 'step'}
+        Not-a-knot cubic spline, monotone cubic, straight lines, or the value of the row above.
+    breaks : sequence of float
+        Arguments at which the quantity may jump. Rows on either side are interpolated separately and carried on
+        to the break by their own polynomial; a row exactly at a break belongs to both sides.
+    """
+
+    name: str
+    unit: str
+    argument: NDArray[np.float64]
+    values: NDArray[np.float64]
+    interpolation: str = "cubic"
+    breaks: tuple[float, ...] = ()
+
+    def __post_init__(self):
+        x, y = np.asarray(self.argument, float), np.asarray(self.values, float)
+        object.__setattr__(self, "argument", x)
+        object.__setattr__(self, "values", y)
+        if x.ndim != 1 or x.shape != y.shape or x.size < 2:
+            raise DataError(f"table '{self.name}' needs at least two rows of argument and value")
+        if not (np.isfinite(x).all() and np.isfinite(y).all()):
+            raise DataError(f"table '{self.name}' holds a value that is not finite")
+        if not (np.diff(x) > 0).all():
+            row = int(np.argmin(np.diff(x) > 0))
+            raise DataError(f"table '{self.name}' is not increasing after argument {x[row]:g}")
+        if self.interpolation not in INTERPOLATIONS:
+            raise DataError(f"interpolation '{self.interpolation}' is not one of {', '.join(INTERPOLATIONS)}")
+
+    @cached_property
+    def polynomial(self) -> PPoly:
+        """The table as a piecewise cubic, extended to the breaks inside its range."""
+        x, y = self.argument, self.values
+        if self.interpolation == "step":
+            return PPoly(np.vstack([np.zeros((ORDER - 1, y.size)), y]), np.append(x, x[-1] + 1.0))
+        inner = [b for b in sorted(set(self.breaks)) if x[0] < b < x[-1]]
+        edges = [x[0], *inner, x[-1]]
+        knots, coefficients = [], []
+        for low, high in zip(edges[:-1], edges[1:], strict=True):
+            inside = (x >= low) & (x <= high)
+            if inside.sum() < 2:
+                raise DataError(f"table '{self.name}' has too few rows between {low:g} and {high:g} to interpolate")
+            piece = _interpolate(x[inside], y[inside], self.interpolation)
+            points = np.unique(np.concatenate([[low], piece.x[(piece.x > low) & (piece.x < high)]]))
+            knots.append(points)
+            coefficients.append(taylor_coefficients(piece, points, points))
+        return PPoly(np.concatenate(coefficients, axis=1), np.append(np.concatenate(knots), x[-1]))
+
+
+def _interpolate(x: NDArray, y: NDArray, interpolation: str) -> PPoly:
+    if interpolation == "linear" or x.size == 2:
+        slope = np.diff(y) / np.diff(x)
+        return PPoly(np.vstack([np.zeros((2, slope.size)), slope, y[:-1]]), x)
+    if interpolation == "pchip":
+        return PchipInterpolator(x, y)
+    return CubicSpline(x, y, bc_type="not-a-knot")
+
+
+def taylor_coefficients(polynomial: PPoly, points: ArrayLike, inside: ArrayLike) -> NDArray:
+    """Expand a piecewise polynomial about ``points``, using the piece that holds ``inside``.
+
+    Returns
+    -------
+    (4, n) array
+        Highest power first, as SciPy's PPoly orders them.
+    """
+    points, inside = np.asarray(points, float), np.asarray(inside, float)
+    piece = np.clip(np.searchsorted(polynomial.x, inside, side="right") - 1, 0, polynomial.c.shape[1] - 1)
+    c = np.zeros((ORDER, points.size))
+    c[ORDER - polynomial.c.shape[0] :] = polynomial.c[:, piece]
+    u = points - polynomial.x[piece]
+    c3, c2, c1, c0 = c
+    return np.array([c3, c2 + 3 * c3 * u, c1 + u * (2 * c2 + 3 * c3 * u), c0 + u * (c1 + u * (c2 + u * c3))])
+
+
+@dataclass(frozen=True, eq=False)
+class TableGroup:
+    """All tables over one argument, on common knots.
+
+    Parameters
+    ----------
+    name : str
+    argument : str
+        'time', or the name of a table in an earlier group whose value is the argument here (altitude).
+    names, units : (m,) tuples of str
+    knots : (k,) array
+        Beyond the first and last knot the value there is held.
+    coefficients : (k - 1, 4, m) array
+        Interval, power 0 to 3 of (argument - left knot), table.
+    """
+
+    name: str
+    argument: str
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    knots: NDArray[np.float64]
+    coefficients: NDArray[np.float64]
+
+    def __post_init__(self):
+        k, m = self.knots.size, len(self.names)
+        if self.coefficients.shape != (k - 1, ORDER, m) or len(self.units) != m:
+            raise DataError(f"table group '{self.name}': coefficients do not match {k} knots and {m} tables")
+
+    @staticmethod
+    def from_polynomials(
+        name: str, argument: str, polynomials: Sequence[tuple[str, str, PPoly]], start: float, end: float
+    ) -> TableGroup:
+        """Merge (name, unit, polynomial) onto the union of the knots between ``start`` and ``end``."""
+        inner = np.concatenate([p.x for _, _, p in polynomials])
+        knots = np.unique(np.concatenate([[start], inner[(inner > start) & (inner < end)], [end]]))
+        keep = np.concatenate([[True], np.diff(knots) > 1e-9 * max(1.0, abs(end))])
+        knots = knots[keep]
+        middle = 0.5 * (knots[:-1] + knots[1:])
+        columns = [taylor_coefficients(p, knots[:-1], middle)[::-1].T for _, _, p in polynomials]
+        return TableGroup(
+            name,
+            argument,
+            tuple(n for n, _, _ in polynomials),
+            tuple(u for _, u, _ in polynomials),
+            knots,
+            np.stack(columns, axis=2),
+        )
+
+    @property
+    def size(self) -> int:
+        """Length of the run-time vector: knots, then coefficients in storage order."""
+        return self.knots.size + self.coefficients.size
+
+    def run_time_vector(self) -> NDArray[np.float64]:
+        """Return knots and coefficients as the generated code expects them, shape (size,)."""
+        return np.concatenate([self.knots, self.coefficients.ravel()])
+
+    def evaluate(self, argument: ArrayLike) -> NDArray[np.float64]:
+        """Return all table values, shape (..., m)."""
+        x = np.clip(np.asarray(argument, float), self.knots[0], self.knots[-1])
+        i = np.clip(np.searchsorted(self.knots, x, side="right") - 1, 0, self.knots.size - 2)
+        u, c = (x - self.knots[i])[..., None], self.coefficients[i]
+        return c[..., 0, :] + u * (c[..., 1, :] + u * (c[..., 2, :] + u * c[..., 3, :]))
+
+    def lookup(self, argument: ca.MX, data: ca.MX, offset: int) -> ca.MX:
+        """Return the values as a CasADi expression.
+
+        Parameters
+        ----------
+        argument : MX scalar
+        data : MX vector
+            Run-time vector that holds this group's numbers from ``offset`` on.
+        """
+        k, m = self.knots.size, len(self.names)
+        x = ca.fmin(ca.fmax(argument, data[offset]), data[offset + k - 1])
+        i = ca.low(data[offset : offset + k], x, {"lookup_mode": "binary"})
+        u = x - data.nz[offset + i]
+        first = offset + k + i * (ORDER * m)
+        c0, c1, c2, c3 = (data.nz[first + ca.DM(range(power * m, (power + 1) * m))] for power in range(ORDER))
+        return c0 + u * (c1 + u * (c2 + u * c3))
+
+
+def table_values(groups: Sequence[TableGroup], time: float) -> dict[str, float]:
+    """Return every table value at a time (s), by name."""
+    found: dict[str, float] = {}
+    for group in groups:
+        argument = time if group.argument == "time" else found[group.argument]
+        found.update(zip(group.names, group.evaluate(argument).tolist(), strict=True))
+    return found
+
+
+def run_time_vector(groups: Sequence[TableGroup]) -> NDArray[np.float64]:
+    """Return all groups as one run-time vector."""
+    return np.concatenate([np.zeros(0), *(g.run_time_vector() for g in groups)])

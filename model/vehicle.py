@@ -1,0 +1,272 @@
+"""A vehicle: the numbers of one TOML file and its CSV tables, checked, and ready for the equations."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from .csv_table import CsvTable, read_csv_table
+from .errors import DataError, suggestion
+from .tables import Table
+from .vehicle_file import (
+    BendingEntry,
+    NoiseEntry,
+    SloshEntry,
+    TableEntry,
+    TransferFunctionEntry,
+    VehicleFile,
+    WindEntry,
+    read_vehicle_file,
+)
+from .wind_filter import TwoPartKernel
+from .wind_statistics import WindModel, closed_form_filter, report_standard_deviation
+
+VEHICLE_FILE = "vehicle.toml"
+
+# Columns by role: (name, unit, sign). '+' positive, '0' not negative, '' any.
+RIGID_BODY = (("mass", "kg", "+"), ("moment_of_inertia", "kg m2", "+"), ("center_of_gravity", "m", ""))
+TRAJECTORY = (
+    ("altitude", "m", ""),
+    ("relative_velocity", "m/s", "+"),
+    ("dynamic_pressure", "Pa", "0"),
+    ("axial_acceleration", "m/s2", ""),
+    ("axial_drag", "N", ""),
+)
+PROPULSION = (("thrust", "N", "0"), ("control_thrust", "N", "0"))
+AERODYNAMICS = (("normal_force_slope", "1/rad", ""), ("center_of_pressure", "m", ""))
+GAINS = (("attitude_gain", "1", ""), ("rate_gain", "s", ""))
+SLOSH = (("mass", "kg", "+"), ("frequency", "rad/s", "+"), ("attach_point", "m", ""))
+WIND = (("mean", "m/s", ""), ("standard_deviation", "m/s", "+"))
+
+
+@dataclass(frozen=True)
+class TableSource:
+    """Where the numbers of a table come from, and the last time or altitude it covers."""
+
+    name: str
+    file: Path
+    status: str
+    source: str
+    first: float
+    last: float
+
+
+@dataclass(frozen=True, eq=False)
+class Vehicle:
+    """Everything the equations need to know about a vehicle.
+
+    Attributes
+    ----------
+    name, title : str
+    folder : Path
+    file : VehicleFile
+        The TOML file as read.
+    tables : dict of str to Table
+        Quantities over flight time by their full name, such as 'bending.1.frequency'.
+    wind : WindModel
+    start, end : float
+        Flight times covered, s.
+    discontinuities : tuple of float
+        Times at which a table jumps.
+    sources : tuple of TableSource
+        Provenance by file.
+    """
+
+    name: str
+    title: str
+    folder: Path
+    file: VehicleFile
+    tables: dict[str, Table]
+    wind: WindModel
+    start: float
+    end: float
+    discontinuities: tuple[float, ...]
+    sources: tuple[TableSource, ...]
+
+    @property
+    def bending(self) -> tuple[BendingEntry, ...]:
+        return self.file.bending
+
+    @property
+    def slosh(self) -> tuple[SloshEntry, ...]:
+        return self.file.slosh
+
+    @property
+    def noise(self) -> dict[str, NoiseEntry]:
+        return self.file.noise
+
+    @property
+    def transfer_functions(self) -> dict[str, TransferFunctionEntry]:
+        """T1 (attitude), T2 (attitude rate) and T3 (actuator), equations 4-5 to 4-7."""
+        return {"T1": self.file.control.T1, "T2": self.file.control.T2, "T3": self.file.control.T3}
+
+
+def load_vehicle(folder: Path) -> Vehicle:
+    """Load a vehicle folder.
+
+    Parameters
+    ----------
+    folder : Path
+        Holds ``vehicle.toml`` and the CSV files it names.
+
+    Raises
+    ------
+    DataError
+        Names the file, column and row at fault.
+    """
+    toml = folder / VEHICLE_FILE
+    if not toml.is_file():
+        raise DataError(
+            f"holds no {VEHICLE_FILE}; start from 'ascentwind new-vehicle DIR --from as504'", file=folder
+        )
+    file = read_vehicle_file(toml)
+    reader = _Reader(folder, toml, file.events)
+    for name, columns in (
+        ("rigid_body", RIGID_BODY),
+        ("trajectory", TRAJECTORY),
+        ("propulsion", PROPULSION),
+        ("aerodynamics", AERODYNAMICS),
+    ):
+        reader.add(name, getattr(file.tables, name), columns)
+    reader.add("control.gains", file.control.gains, GAINS, "control.")
+    tanks = [tank.name for tank in file.slosh]
+    if len(set(tanks)) < len(tanks):
+        raise DataError("two slosh tanks have the same name; rename one", file=toml, column="slosh")
+    for i, mode in enumerate(file.bending, start=1):
+        reader.add(f"bending.{i}", mode.table, _bending_columns(tanks), f"bending.{i}.")
+    for tank in file.slosh:
+        reader.add(f"slosh.{tank.name}", tank.table, SLOSH, f"slosh.{tank.name}.")
+    outputs = [load.output for load in file.loads]
+    if len(set(outputs)) < len(outputs):
+        raise DataError("two loads have the same output name; rename one", file=toml, column="loads")
+    for load in file.loads:
+        columns = _load_columns(len(file.bending), tanks)
+        reader.add(f"loads.{load.output}", load.table, columns, f"loads.{load.output}.")
+    for name, noise in file.noise.items():
+        for table in noise.tables:
+            if table not in reader.tables:
+                raise DataError(
+                    f"there is no table '{table}'{suggestion(table, reader.tables)}", file=toml, column=f"noise.{name}"
+                )
+    wind = _load_wind(folder, file.wind, reader)
+    timed = [s for s in reader.sources if s.name != "wind" and s.name != "control.gains"]
+    first, last = max(timed, key=lambda s: s.first), min(timed, key=lambda s: s.last)
+    start = file.start_time_s
+    if start < first.first:
+        raise DataError(
+            f"start_time_s = {start:g} lies before the first row of {first.file.name} at {first.first:g} s; "
+            "start later or extend the table",
+            file=toml,
+            column="start_time_s",
+        )
+    if start >= last.last:
+        raise DataError(
+            f"start_time_s = {start:g} is not before the end of {last.file.name} at {last.last:g} s",
+            file=toml,
+            column="start_time_s",
+        )
+    return Vehicle(
+        name=file.name,
+        title=file.title,
+        folder=folder,
+        file=file,
+        tables=reader.tables,
+        wind=wind,
+        start=start,
+        end=last.last,
+        discontinuities=tuple(sorted(t for t in reader.discontinuities if start < t < last.last)),
+        sources=tuple(reader.sources),
+    )
+
+
+class _Reader:
+    """Collects tables, their sources and the times at which they jump."""
+
+    def __init__(self, folder: Path, toml: Path, events: dict[str, float]):
+        self.folder, self.toml, self.events = folder, toml, events
+        self.tables: dict[str, Table] = {}
+        self.sources: list[TableSource] = []
+        self.discontinuities: set[float] = set()
+
+    def read(self, name: str, entry: TableEntry, columns, argument: str, unit: str) -> CsvTable:
+        csv = read_csv_table(self.folder / entry.file, argument, unit)
+        x = csv.columns[argument]
+        for column, column_unit, sign in columns:
+            csv.column(column, column_unit)
+            if sign:
+                csv.require_positive(column, allow_zero=sign == "0")
+        unknown = set(csv.columns) - {c for c, _, _ in columns} - {argument}
+        if unknown:
+            name = sorted(unknown)[0]
+            raise DataError(
+                f"is not a column that this table uses{suggestion(name, [c for c, _, _ in columns])}; remove it",
+                file=csv.file,
+                column=name,
+            )
+        self.sources.append(TableSource(name, csv.file, entry.status, entry.source, float(x[0]), float(x[-1])))
+        return csv
+
+    def add(self, name: str, entry: TableEntry, columns, prefix: str = "") -> None:
+        csv = self.read(name, entry, columns, "time", "s")
+        for event in entry.events:
+            if event not in self.events:
+                raise DataError(
+                    f"event '{event}' is not listed under [events]{suggestion(event, self.events)}",
+                    file=self.toml,
+                    column=name,
+                )
+        breaks = tuple(sorted(self.events[event] for event in entry.events))
+        self.discontinuities.update(breaks)
+        x = csv.columns["time"]
+        if entry.interpolation == "step":
+            self.discontinuities.update(x[1:].tolist())
+        for column, unit, _ in columns:
+            try:
+                table = Table(prefix + column, unit, x, csv.columns[column], entry.interpolation, breaks)
+                table.polynomial  # noqa: B018  (reports rows too few for a break now, not at first use)
+            except DataError as error:
+                raise DataError(error.why, file=csv.file, column=column) from None
+            self.tables[table.name] = table
+
+
+def _bending_columns(tanks: list[str]):
+    return (
+        ("frequency", "rad/s", "+"),
+        ("generalized_mass", "kg", "+"),
+        ("displacement_at_gimbal", "1", ""),
+        ("slope_at_gimbal", "1/m", ""),
+        ("slope_at_sensor", "1/m", ""),
+        ("normal_force_slope_times_displacement", "1/rad", ""),
+        *((f"displacement_at_{tank}", "1", "") for tank in tanks),
+        *((f"slope_at_{tank}", "1/m", "") for tank in tanks),
+    )
+
+
+def _load_columns(modes: int, tanks: list[str]):
+    return (
+        ("angle_of_attack", "N m/rad", ""),
+        ("engine_angle", "N m/rad", ""),
+        *((f"bending_{i}", "N s2", "") for i in range(1, modes + 1)),
+        *((f"slosh_{tank}", "N s2", "") for tank in tanks),
+    )
+
+
+def _load_wind(folder: Path, entry: WindEntry, reader: _Reader) -> WindModel:
+    csv = reader.read("wind", entry.statistics, WIND, "altitude", "m")
+    h, interpolation = csv.columns["altitude"], entry.statistics.interpolation
+    mean = Table("wind.mean", "m/s", h, csv.columns["mean"], interpolation)
+    sigma = csv.columns["standard_deviation"]
+    if entry.standard_deviation == "cr103010_fit":
+        sigma = report_standard_deviation(h)
+    knots = entry.correlation
+    kernel = TwoPartKernel(
+        *(
+            (np.array(profile.altitude_m), np.array(profile.value))
+            for profile in (knots.long_scale_m, knots.short_scale_m, knots.short_fraction)
+        ),
+        source=knots.source,
+    )
+    deviation = Table("wind.standard_deviation", "m/s", h, sigma, interpolation)
+    return WindModel(mean, closed_form_filter(kernel, deviation))

@@ -1,0 +1,199 @@
+"""What a vehicle's TOML file may hold (pydantic), and errors that name the key and the nearest valid one."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from .errors import DataError, suggestion
+
+Positive = Annotated[float, Field(gt=0)]
+NotNegative = Annotated[float, Field(ge=0)]
+Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
+ExtraOutput = Literal["lateral_drift", "drift_rate", "dynamic_pressure_times_angle_of_attack"]
+
+
+class Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class TableEntry(Section):
+    """One CSV file: where it is, how it is interpolated, and where its numbers come from."""
+
+    file: str
+    status: Literal["found", "computed", "assumed"]
+    source: str
+    interpolation: Literal["cubic", "pchip", "linear", "step"] = "cubic"
+    events: tuple[str, ...] = ()
+
+
+class TransferFunctionEntry(Section):
+    """Numerator and denominator in descending powers of s, as the report prints them."""
+
+    numerator: tuple[float, ...]
+    denominator: tuple[float, ...]
+    source: str = ""
+
+    @model_validator(mode="after")
+    def _proper(self):
+        if not self.numerator or not self.denominator or self.denominator[0] == 0:
+            raise ValueError("needs a numerator and a denominator whose first coefficient is not zero")
+        if len(self.numerator) > len(self.denominator):
+            raise ValueError("has a numerator of higher order than its denominator; add the missing poles")
+        return self
+
+
+class ControlEntry(Section):
+    T1: TransferFunctionEntry
+    T2: TransferFunctionEntry
+    T3: TransferFunctionEntry
+    gains: TableEntry
+
+
+class BendingEntry(Section):
+    damping: NotNegative
+    table: TableEntry
+
+
+class SloshEntry(Section):
+    name: Name
+    damping: NotNegative
+    table: TableEntry
+
+
+class LoadEntry(Section):
+    output: Name
+    station_m: float
+    table: TableEntry
+
+
+class NoiseEntry(Section):
+    """A relative deviation of the named tables, coloured unless ``white`` is set."""
+
+    tables: tuple[str, ...]
+    sigma: NotNegative
+    correlation_time_s: Positive = 1.0
+    white: bool = False
+    source: str = ""
+
+
+class Profile(Section):
+    """Knots over altitude."""
+
+    altitude_m: tuple[float, ...]
+    value: tuple[float, ...]
+
+    @model_validator(mode="after")
+    def _ordered(self):
+        if len(self.altitude_m) != len(self.value) or len(self.value) < 2:
+            raise ValueError("needs as many values as altitudes, two at least")
+        if any(b <= a for a, b in zip(self.altitude_m[:-1], self.altitude_m[1:], strict=True)):
+            raise ValueError("needs altitudes that increase")
+        if any(v <= 0 for v in self.value):
+            raise ValueError("needs positive values")
+        return self
+
+
+class CorrelationEntry(Section):
+    """Two-part kernel: a Matern-3/2 part of length ``long_scale_m`` and an exponential part of ``short_scale_m``."""
+
+    long_scale_m: Profile
+    short_scale_m: Profile
+    short_fraction: Profile
+    source: str
+
+    @model_validator(mode="after")
+    def _fraction(self):
+        if any(v >= 1 for v in self.short_fraction.value):
+            raise ValueError("needs short_fraction between 0 and 1")
+        return self
+
+
+class WindEntry(Section):
+    statistics: TableEntry
+    standard_deviation: Literal["table", "cr103010_fit"] = "table"
+    correlation: CorrelationEntry
+
+
+class OptionsEntry(Section):
+    full_coupling: bool = False
+    extra_outputs: tuple[ExtraOutput, ...] = ()
+
+
+class TablesEntry(Section):
+    rigid_body: TableEntry
+    trajectory: TableEntry
+    propulsion: TableEntry
+    aerodynamics: TableEntry
+
+
+class VehicleFile(Section):
+    """The whole TOML file."""
+
+    format: Literal[1]
+    name: Name
+    title: str
+    start_time_s: float
+    default_times: str
+    reference_area_m2: Positive
+    reference_area_source: str = ""
+    events: dict[str, float] = Field(default_factory=dict)
+    tables: TablesEntry
+    control: ControlEntry
+    bending: tuple[BendingEntry, ...] = ()
+    slosh: tuple[SloshEntry, ...] = ()
+    loads: tuple[LoadEntry, ...] = ()
+    noise: dict[Name, NoiseEntry] = Field(default_factory=dict)
+    wind: WindEntry
+    options: OptionsEntry = OptionsEntry()
+
+
+def read_vehicle_file(file: Path) -> VehicleFile:
+    """Read and check a vehicle's TOML file.
+
+    Raises
+    ------
+    DataError
+        The file, the key in it, what is wrong and the nearest valid key.
+    """
+    try:
+        data = tomllib.loads(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise DataError(f"cannot be read ({error.strerror or error})", file=file) from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise DataError(f"is not valid TOML: {error}", file=file) from None
+    try:
+        return VehicleFile.model_validate(data)
+    except ValidationError as error:
+        first = error.errors()[0]
+        location = [str(part) for part in first["loc"]]
+        key = ".".join(location)
+        if first["type"] == "extra_forbidden":
+            section = _section(VehicleFile, location[:-1])
+            why = f"is not a key here{suggestion(location[-1], section)}"
+        elif first["type"] == "missing":
+            why = "is missing; add it"
+        else:
+            why = str(first["msg"]).removeprefix("Value error, ")
+            if not isinstance(first["input"], dict | list):
+                why += f" (found {first['input']!r})"
+        raise DataError(why, file=file, column=key) from None
+
+
+def _section(model: type[BaseModel], path: list[str]) -> list[str]:
+    """Return the keys allowed at a path of the file, following nested models."""
+    for part in path:
+        if part.isdigit() or part not in model.model_fields:
+            continue
+        annotation = model.model_fields[part].annotation
+        stack = [annotation]
+        while stack:
+            candidate = stack.pop()
+            if isinstance(candidate, type) and issubclass(candidate, BaseModel):
+                model = candidate
+                break
+            stack.extend(getattr(candidate, "__args__", ()))
+    return list(model.model_fields)

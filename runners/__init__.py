@@ -1,0 +1,1 @@
+"""Response statistics, checks, figures and the command line."""
