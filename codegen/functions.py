@@ -44,11 +44,14 @@ class SystemFunctions:
         a source, then the convolution with the known inputs; in units of the response's scale (squared).
     mean : Function
         State: scaled states, driven by the known inputs alone.
+    response : Function
+        (t, low, high, parameters, address, x) -> C x + G u, x not scaled.
     """
 
     matrices: ca.Function
     adjoint: ca.Function
     mean: ca.Function
+    response: ca.Function
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +68,8 @@ class CoreFunctions:
         (t, v, p, x) -> derivative of x with flight time.
     adjoint_quadrature : Function
         (t, v, p, x) -> integrands of the quadratures, per second of flight.
+    response : Function
+        (t, v, p, x) -> outputs without noise.
     """
 
     state_matrix: ca.Function
@@ -72,6 +77,7 @@ class CoreFunctions:
     adjoint: ca.Function
     adjoint_quadrature: ca.Function
     mean: ca.Function
+    response: ca.Function
 
 
 def core_functions(system: LinearSystem) -> CoreFunctions:
@@ -86,6 +92,7 @@ def core_functions(system: LinearSystem) -> CoreFunctions:
         adjoint=ca.Function("adjoint_core", [*at, adjoint], ca.cse([rate])),
         adjoint_quadrature=ca.Function("adjoint_quadrature_core", [*at, adjoint], ca.cse([quadrature])),
         mean=ca.Function("mean_core", [*at, state], ca.cse([mean_rate])),
+        response=ca.Function("response_core", [*at, system.x], ca.cse([ca.densify(_without_noise(system, system.output))])),
     )
 
 
@@ -115,9 +122,13 @@ def _adjoint(system: LinearSystem) -> tuple[ca.SX, ca.SX, ca.SX]:
 def _mean(system: LinearSystem) -> tuple[ca.SX, ca.SX]:
     """Return scaled states and their rate under the known inputs alone."""
     scaled, scale = ca.SX.sym("state", len(system.states)), state_scales(system)
-    signals = ca.vertcat(ca.diag(scale) @ scaled, ca.SX.zeros(system.w.numel()), system.input_values)
-    rate = ca.substitute(system.derivative, ca.vertcat(system.x, system.w, system.u), signals)
+    rate = ca.substitute(_without_noise(system, system.derivative), system.x, ca.diag(scale) @ scaled)
     return scaled, ca.densify(ca.diag(1 / scale) @ rate)
+
+
+def _without_noise(system: LinearSystem, expression: ca.SX) -> ca.SX:
+    signals = ca.vertcat(ca.SX.zeros(system.w.numel()), system.input_values)
+    return ca.substitute(expression, ca.vertcat(system.w, system.u), signals)
 
 
 def interpreted_functions(
@@ -136,7 +147,15 @@ def interpreted_functions(
     )
     adjoint = _integrand("adjoint", system.p.numel(), groups, core.adjoint, core.adjoint_quadrature, -1.0)
     mean = _integrand("mean", system.p.numel(), groups, core.mean, None, 1.0)
-    return SystemFunctions(matrices, adjoint, mean)
+    x = ca.MX.sym("x", len(system.states))
+    response = ca.Function(
+        "response",
+        [t, low, high, p, address, x],
+        [core.response(t, values, p, x)],
+        ["t", "low", "high", "p", "address", "x"],
+        ["y"],
+    )
+    return SystemFunctions(matrices, adjoint, mean, response)
 
 
 def _integrand(

@@ -69,12 +69,18 @@ def c_source(system: LinearSystem, core: CoreFunctions) -> str:
     scalar = dense[1]
     A = core.state_matrix.sparsity_out(0)
     matrices = [A, *(core.other_matrices.sparsity_out(i) for i in range(len(MATRICES) - 1))]
+    at_time = [("t", scalar), ("low", scalar), ("high", scalar), ("p", dense[system.p.numel()]), ("address", scalar)]
     exported: list[dict[str, Any]] = [
         {
             "name": "matrices",
-            "inputs": [("t", scalar), ("low", scalar), ("high", scalar), ("p", dense[system.p.numel()]), ("address", scalar)],
+            "inputs": at_time,
             "outputs": [(n, patterns.add(sparsity)) for n, sparsity in zip(MATRICES, matrices, strict=True)],
-        }
+        },
+        {
+            "name": "response",
+            "inputs": [*at_time, ("x", patterns.add(core.response.sparsity_in(3)))],
+            "outputs": [("y", patterns.add(core.response.sparsity_out(0)))],
+        },
     ]
     integrands = []
     for name, sign, function, quadratures in (
@@ -115,7 +121,7 @@ def c_source(system: LinearSystem, core: CoreFunctions) -> str:
             c_function("other_matrices_core", core.other_matrices, ("t", "v", "p"), MATRICES[1:], names),
             *(
                 c_function(f.name(), f, ("t", "v", "p", "x"), ("result",), names)
-                for f in (core.adjoint, core.adjoint_quadrature, core.mean)
+                for f in (core.adjoint, core.adjoint_quadrature, core.mean, core.response)
             ),
         ],
         patterns=patterns.labels,

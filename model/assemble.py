@@ -19,7 +19,12 @@ from .tables import TableGroup
 from .vehicle import Vehicle
 from .wind import wind_block
 
-MEAN_TABLES = {"mean.angle_of_attack": "rad", "mean.engine_angle": "rad", "mean.attitude": "rad"}
+# tables of the mean response, all in rad, and the output or state that each holds
+MEAN_TABLES = {
+    "mean.angle_of_attack": ("output", "angle_of_attack"),
+    "mean.engine_angle": ("output", "engine_angle"),
+    "mean.attitude": ("state", "attitude"),
+}
 MEAN_SPACING = 0.05  # s, of the tables of the mean response
 
 # Typical sizes: they only weigh the integrators' errors against each other.
@@ -48,7 +53,7 @@ def vehicle_tables(vehicle: Vehicle) -> tuple[TableGroup, ...]:
     wind_group = TableGroup.from_polynomials("wind", "altitude", over_altitude, bottom, top)
     knots = mean_knots(vehicle.start, vehicle.end, vehicle.discontinuities)
     zero = np.zeros((knots.size - 1, 4, len(MEAN_TABLES)))
-    mean_group = TableGroup("mean", "time", tuple(MEAN_TABLES), tuple(MEAN_TABLES.values()), knots, zero)
+    mean_group = TableGroup("mean", "time", tuple(MEAN_TABLES), ("rad",) * len(MEAN_TABLES), knots, zero)
     return flight, wind_group, mean_group
 
 

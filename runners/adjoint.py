@@ -1,0 +1,131 @@
+"""Backward integration of the adjoint: one run a time of interest serves all responses and all sources."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..codegen.compiled import ExecutableSystem
+from ..codegen.functions import state_scales
+from .integration import Counters, Integrator, IntegratorOptions, intervals
+
+
+@dataclass(frozen=True, eq=False)
+class AdjointRun:
+    """Result of one backward run from t2.
+
+    Attributes
+    ----------
+    time : float
+        t2, s.
+    variance : (responses, sources) array
+        Unit of the response squared.
+    mean : (responses,) array
+        Convolution of the weighting function with the known inputs, the part at t2 itself included.
+    adjoint_at_start : (n, responses) array
+    counters : dict
+        CVODES steps, evaluations, Newton setups and failed error tests.
+    """
+
+    time: float
+    variance: NDArray[np.float64]
+    mean: NDArray[np.float64]
+    adjoint_at_start: NDArray[np.float64]
+    counters: dict[str, int]
+
+
+@dataclass(frozen=True, eq=False)
+class AdjointHistory:
+    """Adjoint and weighting functions along one backward run.
+
+    Attributes
+    ----------
+    times : (k,) array
+        Increasing; a discontinuity stands twice, its left and right side.
+    noise : (k, responses, noises) array
+        g(t2, t) = B' lambda, from each white noise.
+    inputs : (k, responses, inputs) array
+        E' lambda, from each known input (the wind straight into the vehicle).
+    direct : (responses, inputs) array
+        Weight of the delta that the latter holds at t = t2.
+    """
+
+    times: NDArray[np.float64]
+    adjoint: NDArray[np.float64]
+    noise: NDArray[np.float64]
+    inputs: NDArray[np.float64]
+    direct: NDArray[np.float64]
+
+
+class AdjointSolver:
+    """Runs the adjoint of a system backward with CVODES."""
+
+    def __init__(self, executable: ExecutableSystem, options: IntegratorOptions):
+        self._executable = executable
+        self._integrator = Integrator(executable.functions.adjoint, options)
+        system = executable.system
+        self._state_scale = state_scales(system)
+        self._output_scale = np.array([o.scale for o in system.outputs])
+        values = executable.parameters
+        self._start_covariance = [system.start_covariance_matrix(source, values) for source in system.sources]
+
+    def _terminal(self, time: float) -> tuple[NDArray, NDArray, NDArray]:
+        """Return scaled adjoints at t2, G and the known inputs there."""
+        last = intervals(self._executable.system, self._executable.system.start, time)[-1]
+        matrices = self._executable.matrices(time, last.low, last.high)
+        scaled = self._state_scale[:, None] * matrices["C"].T / self._output_scale
+        return scaled, matrices["G"], matrices["inputs"][:, 0]
+
+    def run(self, time: float) -> AdjointRun:
+        """Integrate from t2 = ``time`` back to the start of the system.
+
+        Raises
+        ------
+        IntegrationError
+        """
+        system = self._executable.system
+        r, s = len(system.outputs), len(system.sources)
+        counters = Counters()
+        scaled, G, inputs = self._terminal(time)
+        quadratures = np.zeros((r, s + 1))
+        for interval in reversed(intervals(system, system.start, time)):
+            parameters = self._executable.integrator_parameters(
+                interval.end, interval.end - interval.begin, interval.low, interval.high
+            )
+            where = f"of the adjoint from {interval.end:g} s back to {interval.begin:g} s (t2 = {time:g} s)"
+            states, integrals, statistics = self._integrator.run(scaled.ravel("F"), parameters, where)
+            counters.add(statistics)
+            scaled = states[:, -1].reshape(scaled.shape, order="F")
+            quadratures += integrals[:, -1].reshape(r, s + 1)
+        adjoint = scaled / self._state_scale[:, None] * self._output_scale
+        variance = quadratures[:, :s] * self._output_scale[:, None] ** 2
+        for k, covariance in enumerate(self._start_covariance):
+            variance[:, k] += np.einsum("ir,ij,jr->r", adjoint, covariance, adjoint)
+        mean = quadratures[:, s] * self._output_scale + G @ inputs
+        return AdjointRun(time, variance, mean, adjoint, counters.totals)
+
+    def history(self, time: float, spacing: float) -> AdjointHistory:
+        """Return adjoint and weighting functions at points at most ``spacing`` seconds apart."""
+        system = self._executable.system
+        scaled, G, _ = self._terminal(time)
+        times, adjoints, noise, inputs = [], [], [], []
+        for interval in reversed(intervals(system, system.start, time)):
+            span = interval.end - interval.begin
+            points = max(1, int(np.ceil(span / spacing - 1e-9)))
+            parameters = self._executable.integrator_parameters(interval.end, span, interval.low, interval.high)
+            where = f"of the adjoint from {interval.end:g} s back to {interval.begin:g} s (t2 = {time:g} s)"
+            states, _, _ = self._integrator.run(scaled.ravel("F"), parameters, where, points)
+            columns = np.concatenate([scaled.ravel("F")[:, None], states], axis=1)
+            for t, column in zip(np.linspace(interval.end, interval.begin, points + 1), columns.T, strict=True):
+                adjoint = column.reshape(scaled.shape, order="F") / self._state_scale[:, None] * self._output_scale
+                matrices = self._executable.matrices(float(t), interval.low, interval.high)
+                times.append(float(t))
+                adjoints.append(adjoint.T)
+                noise.append(adjoint.T @ matrices["B"])
+                inputs.append(adjoint.T @ matrices["E"])
+            scaled = states[:, -1].reshape(scaled.shape, order="F")
+        return AdjointHistory(
+            np.array(times[::-1]), np.array(adjoints[::-1]), np.array(noise[::-1]), np.array(inputs[::-1]), G
+        )

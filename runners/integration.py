@@ -1,0 +1,166 @@
+"""CVODES through CasADi: options, intervals between discontinuities, counters, and errors with a time in them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Literal
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from ..model.errors import IntegrationError
+from ..model.system import LinearSystem
+
+Method = Literal["adams", "bdf"]
+Iteration = Literal["newton", "functional"]
+COUNTERS = ("nsteps", "nfevals", "nlinsetups", "netfails")
+
+
+@dataclass(frozen=True)
+class IntegratorOptions:
+    """How CVODES integrates.
+
+    Parameters
+    ----------
+    method : {'adams', 'bdf'}
+        Multistep formulas. Adams with Newton iteration is the default by measurement (docs/performance.md): the
+        spectrum holds lightly damped bending, which BDF damps, beside filter poles near 100 rad/s, which cost
+        functional iteration its step.
+    iteration : {'newton', 'functional'}
+    relative_tolerance : float
+        On every adjoint and quadrature, between 1e-13 and 1e-2. The absolute tolerance is a thousandth of it, of
+        quantities scaled to be of the order of one.
+    max_steps : int
+        Per interval between discontinuities.
+    """
+
+    method: Method = "adams"
+    iteration: Iteration = "newton"
+    relative_tolerance: float = 1e-6
+    max_steps: int = 1_000_000
+
+    def __post_init__(self):
+        if self.method not in ("adams", "bdf"):
+            raise IntegrationError(f"method '{self.method}' is not known; choose 'adams' or 'bdf'")
+        if self.iteration not in ("newton", "functional"):
+            raise IntegrationError(f"iteration '{self.iteration}' is not known; choose 'newton' or 'functional'")
+        if not 1e-13 <= self.relative_tolerance <= 1e-2:
+            raise IntegrationError(
+                f"a relative tolerance of {self.relative_tolerance:g} cannot be met; choose 1e-13 to 1e-2"
+            )
+
+    def casadi_options(self) -> dict[str, object]:
+        return {
+            "linear_multistep_method": self.method,
+            "nonlinear_solver_iteration": self.iteration,
+            "reltol": self.relative_tolerance,
+            "abstol": 1e-3 * self.relative_tolerance,
+            "max_num_steps": self.max_steps,
+            "quad_err_con": True,
+            "show_eval_warnings": False,
+        }
+
+
+@dataclass(frozen=True)
+class Interval:
+    """Flight times between two discontinuities, and the table limits that keep each side to itself."""
+
+    begin: float
+    end: float
+    low: float
+    high: float
+
+
+def intervals(system: LinearSystem, begin: float, end: float) -> list[Interval]:
+    """Split [begin, end] at the system's discontinuities, in order of time.
+
+    Just before a discontinuity tables are looked up at the next smaller number, at it from its right side; an end
+    that falls on a discontinuity is taken from the left.
+    """
+    inner = [d for d in system.discontinuities if begin < d < end]
+    edges = [begin, *inner, end]
+    jumps = set(system.discontinuities)
+    return [
+        Interval(a, b, a, float(np.nextafter(b, -np.inf)) if b in jumps else b)
+        for a, b in zip(edges[:-1], edges[1:], strict=True)
+    ]
+
+
+@dataclass
+class Counters:
+    """Work done by the solver, added up over intervals."""
+
+    totals: dict[str, int] = field(default_factory=lambda: dict.fromkeys(COUNTERS, 0))
+
+    def add(self, statistics: dict[str, object]) -> None:
+        for name in COUNTERS:
+            value = statistics.get(name, 0)
+            self.totals[name] += int(value) if isinstance(value, int | float) else 0
+
+
+class Integrator:
+    """A CasADi CVODES integrator over pseudo-time 0 to 1, reused for every interval."""
+
+    def __init__(self, function: ca.Function, options: IntegratorOptions):
+        self._function, self._options = function, options.casadi_options()
+        self._by_count: dict[int, ca.Function] = {}
+
+    def run(
+        self, start: NDArray[np.float64], parameters: NDArray[np.float64], where: str, points: int = 1
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], dict[str, object]]:
+        """Integrate.
+
+        Parameters
+        ----------
+        start : (n,) array
+        parameters : (n_p,) array
+        where : str
+            Named in an error.
+        points : int
+            Number of equidistant output points after the start.
+
+        Returns
+        -------
+        states : (n, points) array
+        quadratures : (n_q, points) array
+        statistics : dict
+
+        Raises
+        ------
+        IntegrationError
+            If the solver gives up or the result is not finite.
+        """
+        if points not in self._by_count:
+            grid = np.linspace(0.0, 1.0, points + 1)[1:]
+            self._by_count[points] = ca.integrator(
+                f"{self._function.name()}_{points}", "cvodes", self._function, 0.0, list(grid), self._options
+            )
+        integrator = self._by_count[points]
+        try:
+            result = integrator(x0=start, p=parameters)
+        except RuntimeError as error:
+            raise IntegrationError(f"the integrator gave up {where}: {_reason(error)}") from None
+        states, quadratures = result["xf"].full(), result["qf"].full()
+        if not (np.isfinite(states).all() and np.isfinite(quadratures).all()):
+            raise IntegrationError(
+                f"the integration {where} left the range of numbers; the system grows without bound there or a "
+                "table holds an impossible value (see 'ascentwind inspect')"
+            )
+        return states, quadratures, integrator.stats()
+
+
+def _reason(error: RuntimeError) -> str:
+    text = str(error)
+    for mark, plain in (
+        ("CV_TOO_MUCH_WORK", "too many steps; loosen the tolerance or raise max_steps"),
+        ("CV_TOO_MUCH_ACC", "the tolerance is finer than rounding allows; loosen it"),
+        ("CV_ERR_FAILURE", "the error test failed again and again; look for a jump that no event declares"),
+        ("CV_CONV_FAILURE", "the nonlinear solver did not converge; look for a jump that no event declares"),
+        ("CV_RHSFUNC_FAIL", "the equations cannot be evaluated there"),
+        ("CV_FIRST_RHSFUNC_ERR", "the equations cannot be evaluated there"),
+    ):
+        if mark in text:
+            return plain
+    return text.strip().splitlines()[-1] if text.strip() else "no reason given"
