@@ -38,7 +38,7 @@ class IntegratorOptions:
 
     method: Method = "adams"
     iteration: Iteration = "newton"
-    relative_tolerance: float = 1e-6
+    relative_tolerance: float = 1e-7
     max_steps: int = 1_000_000
 
     def __post_init__(self):
