@@ -118,9 +118,7 @@ def assemble(vehicle: Vehicle, wind_start_covariance: np.ndarray) -> LinearSyste
     measured_rate = attitude_rate + sensor_slopes.T @ eta_rate
     T1 = transfer_function("T1", *networks["T1"], measured)
     T2 = transfer_function("T2", *networks["T2"], measured_rate)
-    gains = vehicle.tables
-    attitude_factor = tables["control.attitude_gain"] / float(gains["control.attitude_gain"].values[0])
-    rate_factor = tables["control.rate_gain"] / float(gains["control.rate_gain"].values[0])
+    attitude_factor, rate_factor = tables["control.attitude_factor"], tables["control.rate_factor"]
     T3 = transfer_function("T3", *networks["T3"], attitude_factor * T1.output + rate_factor * T2.output)
 
     alpha_of_state = rigid_body.angle_of_attack(tables, attitude, lateral_velocity, wind.wind + mean_wind)

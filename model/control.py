@@ -4,7 +4,7 @@ beta = T3(s) { K1 T1(s) phi_m + K2 T2(s) phidot_m } + sum_j Y'_j(X_E) eta_j
 phi_m = phi_Z + sum_j Y'_j(X_M) eta_j, and phidot_m likewise.
 
 The report's error signals carry a minus that the lost figure 4-4 undoes once more: with 4-2 as printed only this
-sign closes the loop stably. K1, K2 are the gain schedule relative to its first row; they act behind the networks.
+sign closes the loop stably. K1, K2 are the factors of the gain schedule; they act behind the networks.
 """
 
 from __future__ import annotations

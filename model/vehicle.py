@@ -36,7 +36,7 @@ TRAJECTORY = (
 )
 PROPULSION = (("thrust", "N", "0"), ("control_thrust", "N", "0"))
 AERODYNAMICS = (("normal_force_slope", "1/rad", ""), ("center_of_pressure", "m", ""))
-GAINS = (("attitude_gain", "1", ""), ("rate_gain", "s", ""))
+GAINS = (("attitude_factor", "1", ""), ("rate_factor", "1", ""))
 SLOSH = (("mass", "kg", "+"), ("frequency", "rad/s", "+"), ("attach_point", "m", ""))
 WIND = (("mean", "m/s", ""), ("standard_deviation", "m/s", "+"))
 

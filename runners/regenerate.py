@@ -58,7 +58,7 @@ def regenerate(vehicle: str | Path, folder: Path) -> dict[Path, str]:
             states[path] = "unchanged"
             continue
         changes = describe_changes(before, dict(system.structure)) if before else []
-        states[path] = f"written ({'; '.join(changes) or ('code generator changed' if before else 'new')})"
+        states[path] = f"written ({'; '.join(changes) or ('equations, names or code generator changed' if before else 'new')})"
         write_whole(path, lambda p, text=text: p.write_text(text))
     return states
 
