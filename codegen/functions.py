@@ -131,9 +131,7 @@ def _without_noise(system: LinearSystem, expression: ca.SX) -> ca.SX:
     return ca.substitute(expression, ca.vertcat(system.w, system.u), signals)
 
 
-def interpreted_functions(
-    system: LinearSystem, core: CoreFunctions, groups: Sequence[TableGroup]
-) -> SystemFunctions:
+def interpreted_functions(system: LinearSystem, core: CoreFunctions, groups: Sequence[TableGroup]) -> SystemFunctions:
     """Return the functions for CasADi's interpreter, with the numbers of ``groups`` built in."""
     t, low, high, address = (ca.MX.sym(n) for n in ("t", "low", "high", "address"))
     p = ca.MX.sym("p", system.p.numel())

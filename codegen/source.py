@@ -28,10 +28,7 @@ class _Patterns:
 
     def add(self, sparsity: ca.Sparsity) -> str:
         rows, columns = sparsity.shape
-        if sparsity.is_dense():
-            values = [rows, columns, 1]
-        else:
-            values = [rows, columns, *sparsity.colind(), *sparsity.row()]
+        values = [rows, columns, 1] if sparsity.is_dense() else [rows, columns, *sparsity.colind(), *sparsity.row()]
         for label, known in self.labels.items():
             if known == values:
                 return label

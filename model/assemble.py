@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import casadi as ca
 import numpy as np
@@ -62,7 +63,7 @@ def mean_knots(start: float, end: float, discontinuities: Sequence[float]) -> np
     edges = [start, *discontinuities, end]
     pieces = [
         np.linspace(low, high, max(4, int(np.ceil((high - low) / MEAN_SPACING))) + 1)[:-1]
-        for low, high in zip(edges[:-1], edges[1:], strict=True)
+        for low, high in pairwise(edges)
     ]
     return np.append(np.concatenate(pieces), end)
 
@@ -183,7 +184,16 @@ def assemble(vehicle: Vehicle, wind_start_covariance: np.ndarray) -> LinearSyste
     for name, process in noises.items():
         entry = vehicle.noise[name]
         column = _deviation_column(
-            vehicle, name, entry.tables, both, tables, x, attitude, alpha, beta, ca.vertcat(alpha_of_state, beta_of_state)
+            vehicle,
+            name,
+            entry.tables,
+            both,
+            tables,
+            x,
+            attitude,
+            alpha,
+            beta,
+            ca.vertcat(alpha_of_state, beta_of_state),
         )
         derivative += column[: x.numel()] * process.deviation
         output += column[x.numel() :] * process.deviation

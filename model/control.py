@@ -68,7 +68,5 @@ def transfer_function(name: str, gain: ca.SX, numerator: ca.SX, denominator: ca.
     last = signal - sum((a[n - k] / w0 ** (n - k) * x[k] for k in range(n)), ca.SX(0))
     derivative = w0 * ca.vertcat(x[1:], last)
     direct = b[0]
-    output = direct * signal + sum(
-        ((b[n - k] - direct * a[n - k]) / w0 ** (n - k) * x[k] for k in range(n)), ca.SX(0)
-    )
+    output = direct * signal + sum(((b[n - k] - direct * a[n - k]) / w0 ** (n - k) * x[k] for k in range(n)), ca.SX(0))
     return TransferFunction(x, derivative, gain * output)

@@ -118,9 +118,7 @@ def load_vehicle(folder: Path) -> Vehicle:
     """
     toml = folder / VEHICLE_FILE
     if not toml.is_file():
-        raise DataError(
-            f"holds no {VEHICLE_FILE}; start from 'ascentwind new-vehicle DIR --from as504'", file=folder
-        )
+        raise DataError(f"holds no {VEHICLE_FILE}; start from 'ascentwind new-vehicle DIR --from as504'", file=folder)
     file = read_vehicle_file(toml)
     reader = _Reader(folder, toml, file.events)
     for name, columns in (

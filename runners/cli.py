@@ -165,7 +165,9 @@ def inspect(
 @app.command()
 def regenerate(
     vehicle: Annotated[str, typer.Argument(help="A shipped vehicle or a vehicle folder.")] = "as504",
-    out: Annotated[Path, typer.Option(help="Folder in which the vehicle gets a folder of its own.")] = Path("generated"),
+    out: Annotated[Path, typer.Option(help="Folder in which the vehicle gets a folder of its own.")] = Path(
+        "generated"
+    ),
 ) -> None:
     """Write the readable C of a vehicle and its manifest anew."""
     from .regenerate import regenerate as write
@@ -189,7 +191,9 @@ def doctor() -> None:
 def main() -> None:
     """Run the command line; errors that ascentwind raises on purpose end with their sentence and exit code 2."""
     logging.basicConfig(
-        level=logging.INFO, format="%(message)s", handlers=[RichHandler(console=errors, show_time=False, show_path=False)]
+        level=logging.INFO,
+        format="%(message)s",
+        handlers=[RichHandler(console=errors, show_time=False, show_path=False)],
     )
     warnings.showwarning = _show_warning
     try:
@@ -200,7 +204,12 @@ def main() -> None:
 
 
 def _show_warning(
-    message: Warning | str, category: type[Warning], filename: str, lineno: int, file: TextIO | None = None, line: str | None = None
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    file: TextIO | None = None,
+    line: str | None = None,
 ) -> None:
     if issubclass(category, AscentwindWarning):
         errors.print(f"[yellow]warning:[/] {_escape(str(message))}", soft_wrap=True, highlight=False)

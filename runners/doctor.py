@@ -30,14 +30,18 @@ def diagnose() -> list[Finding]:
             findings.append(Finding("C compiler", f"{' '.join(compiler.command)}: {compiler.version}", True))
         else:
             findings.append(
-                Finding("C compiler", "none", False, "install cc, gcc or clang, or set CC, for speed; results are the same")
+                Finding(
+                    "C compiler", "none", False, "install cc, gcc or clang, or set CC, for speed; results are the same"
+                )
             )
     except CompilerError as error:
         compiler = None
         findings.append(Finding("C compiler", str(error.output), False, "point CC to a compiler that exists"))
     findings.append(Finding("CasADi", ca.CasadiMeta.version(), True))
     has_cvodes = ca.has_integrator("cvodes")
-    findings.append(Finding("CVODES", "in CasADi" if has_cvodes else "missing", has_cvodes, "reinstall casadi from its wheel"))
+    findings.append(
+        Finding("CVODES", "in CasADi" if has_cvodes else "missing", has_cvodes, "reinstall casadi from its wheel")
+    )
     try:
         folder = cache_folder()
         count = len(list(folder.glob("*.so")))

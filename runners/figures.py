@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 
@@ -25,7 +26,7 @@ DISPLAY = {
     "Pa rad": (1e-3 * 180 / np.pi, "kPa deg"),
     "1": (1.0, "1"),
 }
-STYLE = {
+STYLE: dict[Any, Any] = {
     "figure.figsize": (8.0, 5.0),
     "figure.dpi": 110,
     "axes.grid": True,

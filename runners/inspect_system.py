@@ -61,7 +61,12 @@ def print_inspection(found: dict[str, Any], console: Console) -> None:
     console.print(table)
     states = [s["name"] for s in found["states"]]
     noises, outputs = [n["name"] for n in found["noises"]], [o["name"] for o in found["outputs"]]
-    for name, rows, columns in (("A", states, states), ("B", states, noises), ("C", outputs, states), ("D", outputs, noises)):
+    for name, rows, columns in (
+        ("A", states, states),
+        ("B", states, noises),
+        ("C", outputs, states),
+        ("D", outputs, noises),
+    ):
         matrix = np.array(found[name]).reshape(len(rows), len(columns))
         table = Table("row", "column: value", title=f"{name}  ({matrix.shape[0]} x {matrix.shape[1]})")
         for label, values in zip(rows, matrix, strict=True):
@@ -71,7 +76,15 @@ def print_inspection(found: dict[str, Any], console: Console) -> None:
     table = Table("root (rad/s)", "frequency (rad/s)", "(Hz)", "damping ratio", "states", title="Roots of A, frozen")
     for root in found["roots"]:
         sign = "±" if root["imaginary_rad_s"] else ""
-        value = f"{root['real_rad_s']:.4g} {sign} {root['imaginary_rad_s']:.4g}j" if sign else f"{root['real_rad_s']:.4g}"
+        value = (
+            f"{root['real_rad_s']:.4g} {sign} {root['imaginary_rad_s']:.4g}j" if sign else f"{root['real_rad_s']:.4g}"
+        )
         frequency = root["frequency_rad_s"]
-        table.add_row(value, f"{frequency:.4g}", f"{frequency / 2 / np.pi:.3g}", f"{root['damping']:.4g}", ", ".join(root["states"]))
+        table.add_row(
+            value,
+            f"{frequency:.4g}",
+            f"{frequency / 2 / np.pi:.3g}",
+            f"{root['damping']:.4g}",
+            ", ".join(root["states"]),
+        )
     console.print(table)

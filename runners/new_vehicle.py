@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 import shutil
 import tempfile
@@ -34,7 +33,7 @@ def copy_vehicle(source: str | Path, folder: Path) -> list[Path]:
             shutil.copytree(start, made, copy_function=shutil.copyfile)
             toml = made / VEHICLE_FILE
             toml.write_text(re.sub(r'(?m)^name = ".*"', f'name = "{name}"', toml.read_text(), count=1))
-            os.replace(made, folder)
+            made.replace(folder)
     except OSError as error:
         raise OutputFolderError(f"{folder} cannot be made ({error.strerror or error}); choose another folder") from None
     return sorted(folder.iterdir())

@@ -47,7 +47,9 @@ def write_whole(path: Path, write: Callable[[Path], object]) -> Path:
         write(temporary)
         temporary.replace(path)
     except OSError as error:
-        raise OutputFolderError(f"{path} cannot be written ({error.strerror or error}); nothing was left there") from None
+        raise OutputFolderError(
+            f"{path} cannot be written ({error.strerror or error}); nothing was left there"
+        ) from None
     finally:
         temporary.unlink(missing_ok=True)
     return path

@@ -35,7 +35,9 @@ def generated_files(system: LinearSystem) -> dict[str, str]:
         "noises": {n.name: n.source for n in system.noises},
         "outputs": {o.name: o.unit for o in system.outputs},
         "parameters": {p.name: p.unit for p in system.parameters},
-        "tables": {g.name: {"argument": g.argument, "knots": g.knots.size, "names": list(g.names)} for g in system.tables},
+        "tables": {
+            g.name: {"argument": g.argument, "knots": g.knots.size, "names": list(g.names)} for g in system.tables
+        },
     }
     return {f"{system.name}.c": source, "manifest.json": json.dumps(manifest, indent=1) + "\n"}
 
@@ -58,7 +60,9 @@ def regenerate(vehicle: str | Path, folder: Path) -> dict[Path, str]:
             states[path] = "unchanged"
             continue
         changes = describe_changes(before, dict(system.structure)) if before else []
-        states[path] = f"written ({'; '.join(changes) or ('equations, names or code generator changed' if before else 'new')})"
+        states[path] = (
+            f"written ({'; '.join(changes) or ('equations, names or code generator changed' if before else 'new')})"
+        )
         write_whole(path, lambda p, text=text: p.write_text(text))
     return states
 

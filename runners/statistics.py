@@ -169,7 +169,7 @@ def provenance(study: Study) -> dict[str, object]:
 
 
 def data_hash(study: Study) -> str:
-    """Return a hash of all numbers: tables (the mean response excepted, which follows from the others) and parameters."""
+    """Return a hash of parameters and tables, the mean response excepted, which follows from the others."""
     digest = hashlib.sha256()
     for group in study.executable.groups:
         if group.name != "mean":

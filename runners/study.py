@@ -190,8 +190,8 @@ class Study:
         -------
         xarray.Dataset
             ``noise_weighting`` (response, noise, t): response to a unit impulse of each white noise at t; squared
-            and integrated it gives the variance. ``input_weighting`` (response, input, t): response to an impulse of the wind
-            straight into the vehicle; its delta at t = t2 has the weight ``direct`` (response, input).
+            and integrated it gives the variance. ``input_weighting`` (response, input, t): response to an impulse of
+            the wind straight into the vehicle; its delta at t = t2 has the weight ``direct`` (response, input).
         """
         self._check_times([time])
         if not spacing > 0:

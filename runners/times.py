@@ -25,7 +25,9 @@ def parse_times(text: str) -> list[float]:
     except ValueError:
         raise TimeRangeError(f"'{text}' does not name times; {form}") from None
     if not all(np.isfinite((start, stop, step))) or step <= 0 or stop < start:
-        raise TimeRangeError(f"'{text}' names no times: the stop comes before the start or the step is not positive; {form}")
+        raise TimeRangeError(
+            f"'{text}' names no times: the stop comes before the start or the step is not positive; {form}"
+        )
     if (stop - start) / step > MOST:
         raise TimeRangeError(f"'{text}' names more than {MOST} times; take a larger step")
     return [float(t) for t in start + step * np.arange(int(np.floor((stop - start) / step + 1e-9)) + 1)]

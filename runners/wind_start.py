@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
@@ -34,7 +36,7 @@ def covariance_at(shaping_filter: ShapingFilter, altitude: float) -> NDArray[np.
 
     edges = [bottom, *(k for k in shaping_filter.kinks if bottom < k < altitude), altitude]
     P = start.ravel()
-    for low, high in zip(edges[:-1], edges[1:], strict=True):
+    for low, high in pairwise(edges):
         P = solve_ivp(rate, (low, high), P, method="DOP853", rtol=1e-10, atol=1e-12).y[:, -1]
     P = P.reshape(n, n)
     return 0.5 * (P + P.T)

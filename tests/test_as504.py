@@ -61,7 +61,9 @@ def test_results_are_labelled(as504, tmp_path):
     assert list(stats["source"].values) == ["wind", "thrust", "center_of_pressure", "combined"]
     assert stats["unit"].sel(response="bending_moment") == "N m"
     sigma = stats.std.sel(response="bending_moment", source="wind", time=75)
-    assert float(sigma) ** 2 == pytest.approx(float(stats.variance.sel(response="bending_moment", source="wind", time=75)))
+    assert float(sigma) ** 2 == pytest.approx(
+        float(stats.variance.sel(response="bending_moment", source="wind", time=75))
+    )
     total = stats.mean.sel(time=75, source="combined") + 3 * stats.std.sel(time=75, source="combined")
     np.testing.assert_allclose(total, stats.mean_plus_3sigma.sel(time=75, source="combined"))
     np.testing.assert_allclose(

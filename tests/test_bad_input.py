@@ -162,5 +162,12 @@ def test_command_line_ends_with_a_sentence_and_code_2(arguments, message, tmp_pa
 
 
 def test_every_error_is_an_ascentwind_error():
-    for error in (DataError, DirectNoiseError, IntegrationError, SingularCouplingError, TimeRangeError, UnknownNameError):
+    for error in (
+        DataError,
+        DirectNoiseError,
+        IntegrationError,
+        SingularCouplingError,
+        TimeRangeError,
+        UnknownNameError,
+    ):
         assert issubclass(error, AscentwindError)

@@ -6,7 +6,13 @@ import casadi as ca
 import numpy as np
 import pytest
 from ascentwind.model import LinearSystem, define_system
-from ascentwind.model.errors import DirectNoiseError, NonlinearSystemError, TimeRangeError, UnknownNameError, UnstableSystemWarning
+from ascentwind.model.errors import (
+    DirectNoiseError,
+    NonlinearSystemError,
+    TimeRangeError,
+    UnknownNameError,
+    UnstableSystemWarning,
+)
 from ascentwind.runners import IntegratorOptions, Study
 from scipy.special import exp1
 
@@ -62,8 +68,7 @@ def test_oscillator_switched_on_has_its_closed_form(w, z):
     s = times - 1.0
     decay = np.exp(-2 * z * w * s)
     expected = (
-        1
-        - decay * (w**2 / wd**2 + z * w / wd * np.sin(2 * wd * s) - (z * w / wd) ** 2 * np.cos(2 * wd * s))
+        1 - decay * (w**2 / wd**2 + z * w / wd * np.sin(2 * wd * s) - (z * w / wd) ** 2 * np.cos(2 * wd * s))
     ) / (4 * z * w**3)
     np.testing.assert_allclose(variance(oscillator(w, z), times), expected, rtol=1e-7)
 
@@ -90,9 +95,7 @@ def euler_cauchy_weight(t2, t):
 def test_euler_cauchy_system_has_its_closed_form():
     times = np.array([1.5, 3.0, 8.0])
     # integral_1^t2 (t^2/t2 - t^3/t2^2)^2 dt, term by term
-    expected = [
-        (t2**5 - 1) / (5 * t2**2) - (t2**6 - 1) / (3 * t2**3) + (t2**7 - 1) / (7 * t2**4) for t2 in times
-    ]
+    expected = [(t2**5 - 1) / (5 * t2**2) - (t2**6 - 1) / (3 * t2**3) + (t2**7 - 1) / (7 * t2**4) for t2 in times]
     np.testing.assert_allclose(variance(euler_cauchy(), times), expected, rtol=1e-8)
 
 
