@@ -92,8 +92,9 @@ def weighting_figure(families: Sequence[xr.Dataset], response: str, unit: str, t
     factor, shown = display(unit)
     latest = max(f.attrs["t2_s"] for f in families)
     first = max(min(float(f["t"].min()) for f in families), latest - 45)
-    with plt.rc_context(STYLE | {"figure.figsize": (8.0, 1.6 * len(families) + 1.4)}):
+    with plt.rc_context(STYLE):
         figure, panels = plt.subplots(len(families), sharex=True, sharey=True, layout="constrained", squeeze=False)
+        figure.set_size_inches(8.0, 1.6 * len(families) + 1.4)
         for family, axes in zip(families, panels[:, 0], strict=True):
             values = family["input_weighting"].sel(response=response).isel(input=0)
             axes.plot(family["t"], factor * values, color=COLORS["wind"], lw=1.2)
