@@ -81,6 +81,16 @@ class ExecutableSystem:
         values = self.functions.matrices(time, low, high, self.parameters, self.address)
         return {name: np.array(value.full()) for name, value in zip(MATRICES, values, strict=True)}
 
+    def input_matrices(
+        self, times: NDArray[np.float64], low: float, high: float
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return B (k, n, n_w) and E (k, n, n_u) at many times."""
+        k, n = times.size, len(self.system.states)
+        fixed = (np.full(k, low), np.full(k, high), np.tile(self.parameters[:, None], k), np.full(k, self.address))
+        found = dict(zip(MATRICES, self.functions.matrices.map(k)(times, *fixed), strict=True))
+        B, E = (found[name].full().reshape(n, k, found[name].shape[1] // k).transpose(1, 0, 2) for name in ("B", "E"))
+        return B, E
+
     def with_numbers(
         self, *, groups: tuple[TableGroup, ...] | None = None, parameters: NDArray[np.float64] | None = None
     ) -> ExecutableSystem:

@@ -6,12 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import matplotlib
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
 import numpy as np
 import xarray as xr
+from matplotlib import rc_context
 from matplotlib.figure import Figure
 
 from .output import write_whole
@@ -56,8 +53,9 @@ def response_figure(statistics: ResponseStatistics, response: str, title: str) -
     factor, unit = display(str(part["unit"].item()))
     first = str(statistics["source"].values[0])
     time = statistics["time"].values
-    with plt.rc_context(STYLE):
-        figure, axes = plt.subplots(layout="constrained")
+    with rc_context(STYLE):
+        figure = Figure(layout="constrained")
+        axes = figure.subplots()
         curves = (
             ("mean", part["mean"].sel(source=COMBINED), "mean", "-"),
             ("wind", part["mean_plus_3sigma"].sel(source=first), f"mean + 3σ, {words(first)} alone", "-"),
@@ -92,9 +90,9 @@ def weighting_figure(families: Sequence[xr.Dataset], response: str, unit: str, t
     factor, shown = display(unit)
     latest = max(f.attrs["t2_s"] for f in families)
     first = max(min(float(f["t"].min()) for f in families), latest - 45)
-    with plt.rc_context(STYLE):
-        figure, panels = plt.subplots(len(families), sharex=True, sharey=True, layout="constrained", squeeze=False)
-        figure.set_size_inches(8.0, 1.6 * len(families) + 1.4)
+    with rc_context(STYLE):
+        figure = Figure(figsize=(8.0, 1.6 * len(families) + 1.4), layout="constrained")
+        panels = figure.subplots(len(families), sharex=True, sharey=True, squeeze=False)
         for family, axes in zip(families, panels[:, 0], strict=True):
             values = family["input_weighting"].sel(response=response).isel(input=0)
             axes.plot(family["t"], factor * values, color=COLORS["wind"], lw=1.2)
@@ -108,10 +106,9 @@ def weighting_figure(families: Sequence[xr.Dataset], response: str, unit: str, t
 
 
 def write_figure(figure: Figure, folder: Path, name: str) -> list[Path]:
-    """Write a figure as PNG and SVG and close it."""
-    written = [
-        write_whole(folder / f"{name}.png", lambda p: figure.savefig(p, dpi=150)),
-        write_whole(folder / f"{name}.svg", lambda p: figure.savefig(p, metadata={"Date": None})),
-    ]
-    plt.close(figure)
-    return written
+    """Write a figure as PNG and SVG."""
+    with rc_context(STYLE):
+        return [
+            write_whole(folder / f"{name}.png", lambda p: figure.savefig(p, dpi=150)),
+            write_whole(folder / f"{name}.svg", lambda p: figure.savefig(p, metadata={"Date": None})),
+        ]
