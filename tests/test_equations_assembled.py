@@ -272,3 +272,16 @@ def test_adjoint_is_minus_the_transposed_state_matrix(as_reported):
     p = [parameter.value for parameter in system.parameters]
     found = derivative(time, list(v.values()), p, given).full()[:, 0]
     np.testing.assert_allclose(found, -A.T @ given, rtol=1e-12, atol=1e-12 * np.abs(A).max())
+
+
+def largest_real_part(model: Assembled, time: float, actuator_gain: float) -> float:
+    p = [actuator_gain if q.name == "control.T3.gain" else q.value for q in model.system.parameters]
+    v = table_values(model.system.tables, time)
+    A = model.core.state_matrix(time, list(v.values()), p).full()
+    return np.linalg.eigvals(A).real.max()
+
+
+@pytest.mark.parametrize("time", np.arange(10.0, 151.0, 10.0))
+def test_only_the_control_sign_read_closes_the_loop(as_reported, time):
+    assert largest_real_part(as_reported, time, +1.0) < 0
+    assert largest_real_part(as_reported, time, -1.0) > 0.5
