@@ -20,6 +20,25 @@ from ..model.errors import IntegrationError
 from .integration import intervals
 
 
+@dataclass(frozen=True)
+class CovarianceOptions:
+    """How the covariance equation is integrated.
+
+    Parameters
+    ----------
+    relative_tolerance : float
+        Of every covariance, between 1e-13 and 1e-2.
+    """
+
+    relative_tolerance: float = 1e-9
+
+    def __post_init__(self):
+        if not 1e-13 <= self.relative_tolerance <= 1e-2:
+            raise IntegrationError(
+                f"a relative tolerance of {self.relative_tolerance:g} cannot be met; choose 1e-13 to 1e-2"
+            )
+
+
 @dataclass(frozen=True, eq=False)
 class CovarianceResult:
     """Variances (k, responses, sources) and means (k, responses) at ``times``."""
