@@ -1,4 +1,4 @@
-"""The command line: ``ascentwind run``, ``vehicles``, ``new-vehicle``, ``inspect``, ``regenerate``, ``doctor``."""
+"""The command line: ``ascentwind run``, ``verify``, ``tolerance``, ``inspect``, ``vehicles`` and others."""
 
 from __future__ import annotations
 
@@ -185,6 +185,72 @@ def doctor() -> None:
     verdicts = diagnose()
     for line in verdicts:
         table.add_row(line.what, line.found, "[green]ok[/]" if line.good else f"[yellow]{line.advice}[/]")
+    console.print(table)
+
+
+@app.command()
+def verify(
+    vehicle: VehicleArgument,
+    times: Annotated[str, typer.Option(help="End times in s: START:STOP:STEP or T1,T2,...")] = "40,60,75,90",
+    runs: Annotated[int, typer.Option(help="Simulated flights of the ensemble.")] = 500,
+    seed: Annotated[int, typer.Option(help="Of the ensemble's noise.")] = 504,
+    out: Annotated[Path | None, typer.Option(help="Folder for a figure of sample paths; none without it.")] = None,
+) -> None:
+    """The same statistics by independent engines, with a verdict; exit code 1 when they disagree."""
+    from .ensemble import EnsembleOptions
+    from .figures import sample_path_figure, write_figure
+    from .output import prepare_folder
+    from .study import Study
+    from .times import parse_times
+    from .verify import verify as run_verification
+
+    options = EnsembleOptions(runs=runs, seed=seed, paths=min(30, runs) if out else 0)
+    if out:
+        prepare_folder(out)
+    with console.status("loading and preparing code"):
+        study = Study.load(vehicle)
+    end_times = parse_times(times)
+    with console.status("computing with every engine"):
+        found = run_verification(study, end_times, options)
+    _print_verification(found)
+    if out:
+        with console.status("drawing sample paths"):
+            start, last = study.system.start, max(end_times)
+            at = [start + (last - start) * k / 60 for k in range(1, 61)]
+            title = f"{study.system.name}: simulated flights and the adjoint's mean ± 3σ"
+            figure = sample_path_figure(found.statistics["ensemble"], study.response_statistics(at), title)
+        for path in write_figure(figure, out, "sample_paths"):
+            console.print(str(path), soft_wrap=True)
+    console.print(found.verdict(), style="green" if found.agree else "bold red", highlight=False)
+    if not found.agree:
+        raise typer.Exit(1)
+
+
+def _print_verification(found) -> None:
+    from .engines import ENGINES
+    from .figures import display, words
+    from .verify import REFERENCE
+
+    reference, ensemble = found.statistics[REFERENCE], found.statistics["ensemble"]
+    table = Table("time", "response", "source", title="Standard deviations by independent engines")
+    table.add_column(f"σ, {ENGINES[REFERENCE].label}", justify="right")
+    for engine in found.differences:
+        table.add_column(f"{ENGINES[engine].label}, difference", justify="right")
+    table.add_column(f"ensemble of {ensemble.attrs['runs']}", justify="right")
+    table.add_column(f"{ensemble.attrs['confidence']:.0%} interval", justify="right")
+    table.add_column("inside")
+    for k, time in enumerate(reference["time"].values):
+        for r, response in enumerate(reference["response"].values):
+            factor, unit = display(str(reference["unit"].values[r]))
+            for s, source in enumerate(reference["source"].values):
+                low, high, std = (factor * ensemble[n].values[k, r, s] for n in ("std_low", "std_high", "std"))
+                table.add_row(
+                    f"{time:g} s", words(response), words(source),
+                    f"{factor * reference['std'].values[k, r, s]:.5g} {unit}",
+                    *(f"{d[k, r, s]:.1e}" for d in found.differences.values()),
+                    f"{std:.4g}", f"{low:.4g} to {high:.4g}", "yes" if found.inside[k, r, s] else "no",
+                    end_section=s + 1 == reference["source"].size,
+                )  # fmt: skip
     console.print(table)
 
 

@@ -35,12 +35,15 @@ class Engine:
         (study, increasing end times, responses, options, progress) -> ResponseStatistics.
     finer : callable
         Options of a finer discretisation, by which the error of the given ones is judged.
+    tight : object or None
+        Options with which engines are held against each other; None for an engine with a sampling error.
     """
 
     label: str
     options: type
     compute: Callable[[Study, list[float], list[str], Any, Progress | None], ResponseStatistics]
     finer: Callable[[Any], Any]
+    tight: object | None
 
 
 def find_engine(name: str) -> Engine:
@@ -129,7 +132,15 @@ def _tenth(options: Any) -> Any:
 
 
 ENGINES = {
-    "cvodes": Engine("adjoint, CVODES", IntegratorOptions, _cvodes, _tenth),
-    "covariance": Engine("covariance equation, SciPy", CovarianceOptions, _covariance, _tenth),
-    "ensemble": Engine("ensemble", EnsembleOptions, _ensemble, lambda o: replace(o, substep=0.5 * o.substep)),
+    "cvodes": Engine(
+        "adjoint (CVODES)", IntegratorOptions, _cvodes, _tenth, IntegratorOptions(relative_tolerance=1e-9)
+    ),
+    "covariance": Engine(
+        "covariance equation (SciPy)",
+        CovarianceOptions,
+        _covariance,
+        _tenth,
+        CovarianceOptions(relative_tolerance=1e-9),
+    ),
+    "ensemble": Engine("ensemble", EnsembleOptions, _ensemble, lambda o: replace(o, substep=0.5 * o.substep), None),
 }

@@ -105,6 +105,30 @@ def weighting_figure(families: Sequence[xr.Dataset], response: str, unit: str, t
     return figure
 
 
+def sample_path_figure(ensemble: ResponseStatistics, statistics: ResponseStatistics, title: str) -> Figure:
+    """Return the sample paths of an ensemble within mean and mean ± 3 sigma computed without it."""
+    names = [str(name) for name in ensemble["response"].values]
+    with rc_context(STYLE):
+        figure = Figure(figsize=(8.0, 2.6 * len(names) + 1.0), layout="constrained")
+        panels = figure.subplots(len(names), sharex=True, squeeze=False)[:, 0]
+        for name, axes in zip(names, panels, strict=True):
+            factor, unit = display(str(ensemble["unit"].sel(response=name).item()))
+            paths = factor * ensemble["sample_path"].sel(response=name).values
+            axes.plot(ensemble["t"], paths.T, color="#7f8c9a", lw=0.5, alpha=0.7)
+            part = statistics.sel(response=name, source=COMBINED)
+            for side in (-3, 3):
+                label = "mean ± 3σ, adjoint" if side > 0 else None
+                edge = factor * (part["mean"] + side * part["std"])
+                axes.plot(statistics["time"], edge, "--", color=COLORS[COMBINED], lw=1.8, label=label)
+            axes.plot(statistics["time"], factor * part["mean"], color=COLORS["mean"], lw=1.8, label="mean")
+            axes.set_ylabel(f"{words(name)} ({unit})")
+        panels[0].plot([], [], color="#7f8c9a", label=f"{ensemble.sizes['path']} simulated flights")
+        panels[0].legend(loc="upper left")
+        panels[-1].set_xlabel("flight time (s)")
+        figure.suptitle(title)
+    return figure
+
+
 def write_figure(figure: Figure, folder: Path, name: str) -> list[Path]:
     """Write a figure as PNG and SVG."""
     with rc_context(STYLE):
