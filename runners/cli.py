@@ -254,6 +254,56 @@ def _print_verification(found) -> None:
     console.print(table)
 
 
+@app.command()
+def tolerance(
+    vehicle: VehicleArgument,
+    times: Annotated[str, typer.Option(help="End times in s: START:STOP:STEP or T1,T2,...")] = "75",
+    out: Annotated[Path | None, typer.Option(help="Folder for the figure; VEHICLE-tolerance without it.")] = None,
+) -> None:
+    """Error and run time of each engine against tolerance, and the variable that paces the step."""
+    from .figures import tolerance_figure, write_figure
+    from .output import prepare_folder
+    from .study import Study
+    from .times import parse_times
+    from .tolerance import TOLERANCES, measure, pacing
+
+    folder = out or Path(f"{Path(vehicle).name}-tolerance")
+    prepare_folder(folder)
+    end_times = parse_times(times)
+    with console.status("loading and preparing code"):
+        study = Study.load(vehicle)
+    with _progress() as progress:
+        task = progress.add_task("tolerances", total=len(TOLERANCES))
+        measured = measure(study, end_times, progress=lambda _: progress.update(task, advance=1))
+    paces = pacing(study, max(end_times))
+    table = Table("engine", title=f"Largest relative error of a σ, and run time, end times {times} s")
+    for value in TOLERANCES:
+        table.add_column(f"{value:.0e}", justify="right")
+    for engine in dict.fromkeys(m.engine for m in measured):
+        rows = [m for m in measured if m.engine == engine]
+        table.add_row(engine, *(f"{m.error:.0e}  {1e3 * m.seconds:.0f} ms" for m in rows))
+    console.print(table)
+    table = Table("flight time", title="What paces the step of CVODES (Adams, 1e-7)")
+    for column in ("fastest root, rad/s", "in", "limit 2/|root|", "step, functional", "step, Newton"):
+        table.add_column(column, justify="right")
+    for column in ("root with the largest local error", "pacing variable"):
+        table.add_column(column)
+    for pace in paces:
+        table.add_row(
+            f"{pace.begin:.4g} - {pace.end:.4g} s", _root(pace.fastest_root), " and ".join(pace.fastest_states),
+            f"{1e3 * pace.functional_limit:.0f} ms", f"{1e3 * pace.functional_step:.0f} ms",
+            f"{1e3 * pace.newton_step:.0f} ms", _root(pace.accuracy_root), pace.pacing_state,
+        )  # fmt: skip
+    console.print(table)
+    figure = tolerance_figure(measured, paces, f"{study.system.name}: end times {times} s")
+    for path in write_figure(figure, folder, "tolerance"):
+        console.print(str(path), soft_wrap=True)
+
+
+def _root(value: complex) -> str:
+    return f"{value.real:.3g}" if value.imag == 0 else f"{value.real:.3g} ± {value.imag:.3g}j"
+
+
 def main() -> None:
     """Run the command line; errors that ascentwind raises on purpose end with their sentence and exit code 2."""
     logging.basicConfig(
