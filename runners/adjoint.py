@@ -87,8 +87,8 @@ class AdjointSolver:
         IntegrationError
         """
         s = len(self._executable.system.sources)
-        _, G, inputs = self._terminal(time)
-        scaled, quadratures, counters = self._backward(time, self._executable.system.start)
+        scaled, G, inputs = self._terminal(time)
+        scaled, quadratures, counters = self._backward(scaled, time, self._executable.system.start)
         adjoint = scaled / self._state_scale[:, None] * self._output_scale
         variance = quadratures[:, :s] * self._output_scale[:, None] ** 2
         for k, covariance in enumerate(self._start_covariance):
@@ -96,16 +96,14 @@ class AdjointSolver:
         mean = quadratures[:, s] * self._output_scale + G @ inputs
         return AdjointRun(time, variance, mean, adjoint, counters.totals)
 
-    def steps(self, time: float, earliest: float) -> int:
-        """Return the number of steps from t2 = ``time`` back to ``earliest``, s."""
-        _, _, counters = self._backward(time, earliest)
-        return counters.totals["nsteps"]
+    def steps(self, adjoint: NDArray[np.float64], time: float, earliest: float) -> int:
+        """Return the number of steps from ``time`` back to ``earliest`` (s) with adjoints (responses, n) at ``time``."""
+        scaled = (adjoint * self._state_scale).T / self._output_scale
+        return self._backward(scaled, time, earliest)[2].totals["nsteps"]
 
-    def _backward(self, time: float, earliest: float) -> tuple[NDArray, NDArray, Counters]:
+    def _backward(self, scaled: NDArray, time: float, earliest: float) -> tuple[NDArray, NDArray, Counters]:
         """Return scaled adjoints (n, responses) at ``earliest``, quadratures and counters."""
-        system = self._executable.system
-        counters = Counters()
-        scaled, _, _ = self._terminal(time)
+        system, counters = self._executable.system, Counters()
         quadratures = np.zeros((len(system.outputs), len(system.sources) + 1))
         for interval in reversed(intervals(system, earliest, time)):
             parameters = self._executable.integrator_parameters(

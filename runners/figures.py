@@ -156,7 +156,8 @@ def tolerance_figure(measurements: Sequence[Measurement], paces: Sequence[Pace],
         ):
             line = ":" if color == "black" else "-"
             steps.stairs([1e3 * v for v in values], edges, baseline=None, label=label, color=color, ls=line, lw=1.8)
-        steps.set(xlabel="flight time (s)", ylabel="mean step of CVODES (ms)", yscale="log")
+        steps.set(xlabel="flight time (s)", ylabel="mean step of CVODES (ms)")
+        steps.set_ylim(0, 1.35e3 * max(max(p.functional_limit, p.newton_step, p.functional_step) for p in paces))
         steps.legend(fontsize=8.5)
         figure.suptitle(title)
     return figure

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
 REFERENCE_TOLERANCE = 1e-11
+PRECISE = 1e-10  # of the adjoint that is taken apart into modes
 TYPICAL_ORDER = 5  # of the formulas, where the local error of each root is weighed
 
 
@@ -118,7 +119,7 @@ def measure(
 def pacing(study: Study, time: float, windows: int = 8, tolerance: float = 1e-7) -> list[Pace]:
     """Name what limits the step of CVODES over the flight before t2 = ``time``.
 
-    Steps are counted in runs back to each end of a window, so that no window pays for a restart.
+    Each window is integrated from the adjoint at its end, so that steps can be counted; the restart costs a few.
 
     Parameters
     ----------
@@ -135,13 +136,11 @@ def pacing(study: Study, time: float, windows: int = 8, tolerance: float = 1e-7)
     study.matrices(time)
     system, executable = study.system, study.with_means
     edges = np.linspace(system.start, time, windows + 1)
-    steps = {}
-    for iteration in ("functional", "newton"):
-        options = IntegratorOptions(iteration=iteration, relative_tolerance=tolerance)
-        solver = AdjointSolver(executable, options)
-        counts = np.array([solver.steps(time, edge) for edge in edges[:-1]] + [0])
-        steps[iteration] = np.diff(edges) / np.maximum(-np.diff(counts), 1)
-    history = AdjointSolver(executable, IntegratorOptions()).history(time, 0.05)
+    history = AdjointSolver(executable, IntegratorOptions(relative_tolerance=PRECISE)).history(time, 0.05)
+    solvers = {
+        iteration: AdjointSolver(executable, IntegratorOptions(iteration=iteration, relative_tolerance=tolerance))
+        for iteration in ("functional", "newton")
+    }
     paces = []
     for k in range(windows):
         middle = 0.5 * (edges[k] + edges[k + 1])
@@ -150,35 +149,36 @@ def pacing(study: Study, time: float, windows: int = 8, tolerance: float = 1e-7)
         fastest = int(np.argmax(np.abs(roots)))
         share = np.abs(np.linalg.inv(right)[fastest] * right[:, fastest])
         taking_part = [system.state_names[i] for i in np.argsort(-share)[:2] if share[i] > 0.15 * share.max()]
-        adjoint = history.adjoint[int(np.argmin(np.abs(history.times - middle)))]
-        root, state = _largest_local_error(study, A, adjoint)
+        at_end = history.adjoint[int(np.argmin(np.abs(history.times - edges[k + 1])))]
+        count = {name: solver.steps(at_end, edges[k + 1], edges[k]) for name, solver in solvers.items()}
+        step = {name: float((edges[k + 1] - edges[k]) / steps) for name, steps in count.items()}
+        within = (history.times >= edges[k]) & (history.times <= edges[k + 1])
+        root, state = _largest_local_error(study, A, history.adjoint[within][::5])
         size = abs(roots[fastest])
         paces.append(
             Pace(
-                float(edges[k]), float(edges[k + 1]), _upper(roots[fastest]), tuple(taking_part), 2.0 / size,
-                float(steps["functional"][k]), float(steps["newton"][k]), _upper(root), system.state_names[state],
+                float(edges[k]), float(edges[k + 1]), _upper(roots[fastest]), tuple(taking_part), 2.0 / float(size),
+                step["functional"], step["newton"], _upper(root), system.state_names[state],
             )
         )  # fmt: skip
     return paces
 
 
-def _largest_local_error(study: Study, A: NDArray, adjoint: NDArray) -> tuple[complex, int]:
+def _largest_local_error(study: Study, A: NDArray, adjoints: NDArray) -> tuple[complex, int]:
     """Return the root, and the state, with the largest share of the local error against the integrator's weight.
 
     The adjoint is a sum of modes c_j v_j of A'; a formula of order q makes a local error proportional to
-    |s_j|^(q+1) |c_j v_j|, which CVODES divides by its weight, relative tolerance times size plus absolute.
+    |s_j|^(q+1) |c_j v_j|, which CVODES divides by its weight, relative tolerance times size plus absolute. Squares
+    are averaged over the adjoints given, (k, responses, n).
     """
-    scaled = adjoint.T * state_scales(study.system)[:, None] / np.array([o.scale for o in study.system.outputs])
     S = state_scales(study.system)
+    scaled = np.moveaxis(adjoints, 2, 1) * S[:, None] / np.array([o.scale for o in study.system.outputs])
     roots, modes = np.linalg.eig(S[:, None] * A.T / S)
     amounts = np.linalg.solve(modes, scaled.astype(complex))
-    weight = np.abs(scaled) + 1e-3
-    error = (
-        np.abs(roots[None, :, None]) ** (TYPICAL_ORDER + 1)
-        * np.abs(modes[:, :, None] * amounts[None])
-        / weight[:, None, :]
-    )
-    state, root, _ = np.unravel_index(np.argmax(error), error.shape)
+    parts = np.abs(modes[None, :, :, None] * amounts[:, None])  # time, state, root, response
+    parts[parts < 1e3 * PRECISE * np.abs(scaled).max()] = 0.0  # the integrator's own error, not a mode
+    error = np.abs(roots[:, None]) ** (TYPICAL_ORDER + 1) * parts / (np.abs(scaled) + 1e-3)[:, :, None]
+    state, root = np.unravel_index(np.argmax((error**2).mean(axis=0).sum(axis=2)), error.shape[1:3])
     return complex(roots[root]), int(state)
 
 
