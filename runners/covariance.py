@@ -39,6 +39,9 @@ def covariance_equation(
         With its tables of the mean response filled in.
     times : sequence of float
         Increasing, s.
+    relative_tolerance : float
+        The absolute one is a ten-millionth of it, of scaled states: a source that hardly moves the vehicle has
+        covariances many orders smaller than the wind's.
 
     Raises
     ------
@@ -71,7 +74,7 @@ def covariance_equation(
 
             solution = solve_ivp(
                 rate, (interval.begin, interval.end), y, method="DOP853",
-                rtol=relative_tolerance, atol=1e-3 * relative_tolerance,
+                rtol=relative_tolerance, atol=1e-7 * relative_tolerance,
             )  # fmt: skip
             if not solution.success or not np.isfinite(solution.y[:, -1]).all():
                 raise IntegrationError(

@@ -35,6 +35,17 @@ def test_the_default_tolerance_keeps_the_promise(as504, forward):
     np.testing.assert_allclose(found.variance.values[:, :, :3], forward.variance[:4], rtol=1e-5)
 
 
+def test_an_end_time_on_a_discontinuity_is_seen_from_the_left(as504):
+    """At engine cutoff thrust and axial acceleration jump, and the bending moment with them."""
+    options = IntegratorOptions(relative_tolerance=1e-9)
+    at, before, after = (
+        as504.response_statistics([time], options=options).std.sel(response="bending_moment").values
+        for time in (134.34, 134.34 - 1e-7, 134.34 + 1e-7)
+    )
+    np.testing.assert_allclose(at, before, rtol=1e-6)
+    assert (np.abs(after / before - 1) > 1e-4).any()
+
+
 def test_convolved_mean_is_the_forward_mean(as504):
     """The weighting function convolved with the mean wind against the forward integration."""
     times = np.linspace(as504.system.start, 80.0, 15)
