@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import xarray as xr
-from ascentwind.model.errors import TimeRangeError, UnknownNameError
+from ascentwind.model.errors import ParameterValueError, TimeRangeError, UnknownNameError
 from ascentwind.runners import IntegratorOptions, Study
 from ascentwind.runners.covariance import covariance_equation
 from ascentwind.runners.mean_response import mean_response
-from ascentwind.runners.study import ParameterValueError
 
 TIMES = (40.0, 60.0, 75.0, 90.0, 105.6, 140.0)  # 105.6 s is a gain switch, seen from the left
 
