@@ -72,7 +72,7 @@ def cache_folder() -> Path:
 
 def content_key(source: str, compiler: Compiler) -> str:
     """Return the hash of everything that shapes a library."""
-    parts = (source, *compiler.command, compiler.version, *FLAGS, processor(), ca.CasadiMeta.version())
+    parts = (source, *compiler.command, compiler.version, *FLAGS, *compiler.options, processor(), ca.CasadiMeta.version())
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]
 
 

@@ -31,10 +31,11 @@ class CompilerError(AscentwindError):
 
 @dataclass(frozen=True)
 class Compiler:
-    """A C compiler and what it calls itself."""
+    """A C compiler, what it calls itself, and options that a source needs beyond ``FLAGS``."""
 
     command: tuple[str, ...]
     version: str
+    options: tuple[str, ...] = ()
 
     def compile(self, source: Path, library: Path) -> None:
         """Compile a C file into a shared library.
@@ -44,7 +45,7 @@ class Compiler:
         CompilerError
             With command and text.
         """
-        command = [*self.command, *FLAGS, "-o", str(library), str(source), "-lm"]
+        command = [*self.command, *FLAGS, *self.options, "-o", str(library), str(source), "-lm"]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         if done.returncode != 0 or not library.is_file():
             raise CompilerError(command, done.returncode, done.stderr + done.stdout)
