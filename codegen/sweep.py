@@ -154,7 +154,9 @@ class CompiledSweep:
             for parameter, value in zip(self.system.parameters, executable.parameters, strict=True):
                 if not np.isfinite(value):
                     raise DataError(f"parameter '{parameter.name}' is {value:g}; give it a finite value", time=time)
-            raise IntegrationError(f"{self._entry(entry)} is not finite at t = {time:g} s; see what divides by zero there")
+            raise IntegrationError(
+                f"{self._entry(entry)} is not finite at t = {time:g} s; see what divides by zero there"
+            )
         if code == TOO_SMALL_A_STEP:
             raise IntegrationError(
                 f"a tolerance of {tolerance:g} a step cannot be met at t = {time:g} s; loosen it, or look for a jump "
