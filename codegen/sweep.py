@@ -136,7 +136,7 @@ class CompiledSweep:
             ctypes.c_double(segments.start),
             *map(_pointer, arrays),
             ctypes.c_double(tolerance),
-            _pointer(state_scales(self.system)),
+            _pointer(np.concatenate([state_scales(self.system), [o.scale for o in self.system.outputs]])),
         ]
 
     def _check(self, code: int, failure: NDArray[np.float64], executable: ExecutableSystem, tolerance: float) -> None:
@@ -164,7 +164,8 @@ class CompiledSweep:
             )
         if code == OUT_OF_RANGE:
             raise IntegrationError(
-                f"the responses left the range of numbers before t = {time:g} s; the system grows without bound there"
+                f"the responses leave the range of numbers near t = {time:g} s; the system grows without bound there "
+                "(see its roots)"
             )
 
     def _entry(self, entry: int) -> str:
