@@ -88,7 +88,7 @@ def sweep(
     executable : ExecutableSystem
         Numbers: parameters, and tables with those of the mean response filled in.
     times : (k,) array
-        End times, increasing, s. One that falls on a discontinuity is taken from the left.
+        End times, increasing, from the start on, s. One that falls on a discontinuity is taken from the left.
     relative_tolerance : float
         Of every standard deviation, between 1e-12 and 1e-2.
     weighting_spacing : float, optional
@@ -102,13 +102,30 @@ def sweep(
     check_tolerance(relative_tolerance)
     check_direct_noise(engine)
     longest = LONGEST_SEGMENT if weighting_spacing is None else min(LONGEST_SEGMENT, weighting_spacing)
-    segments = flight_segments(system, ends, longest)
+    # an end time at the start needs no integration, only a segment to read it in
+    last = ends[-1] if ends[-1] > system.start else min(system.end, system.start + longest)
+    segments = flight_segments(system, np.append(ends[:-1], last), longest)
     result = engine.run(executable, segments, relative_tolerance, transition=weighting_spacing is not None)
-    at = np.searchsorted(segments.end, ends)
+    at = np.where(ends > system.start, np.searchsorted(segments.end, ends), -1)
+    found = result.covariance[at], result.mean[at], result.error[at]
+    if at[0] < 0:
+        for array, value in zip(found, _at_start(executable, segments), strict=True):
+            array[0] = value
     weighting = None
     if result.transition is not None:
         weighting = _weighting_functions(executable, segments, at, result.transition)
-    return SweepResult(ends, result.covariance[at], result.mean[at], result.error[at], result.counters, weighting)
+    return SweepResult(ends, *found, result.counters, weighting)
+
+
+def _at_start(
+    executable: ExecutableSystem, segments: Segments
+) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    """Return covariances, mean and their error before any noise has acted."""
+    system = executable.system
+    matrices = executable.matrices(segments.start, segments.low[0], segments.high[0])
+    covariances = [system.start_covariance_matrix(source, executable.parameters) for source in system.sources]
+    covariance = np.array([matrices["C"] @ P @ matrices["C"].T for P in covariances])
+    return covariance, (matrices["G"] @ matrices["inputs"])[:, 0], 0.0
 
 
 def with_sweep_mean_tables(
@@ -209,11 +226,11 @@ def check_times(system: LinearSystem, times: ArrayLike) -> NDArray[np.float64]:
     ends = np.atleast_1d(np.asarray(times, dtype=float))
     if ends.ndim != 1 or ends.size == 0:
         raise TimeRangeError("the sweep needs at least one end time")
-    inside = (ends > system.start) & (ends <= system.end)
+    inside = (ends >= system.start) & (ends <= system.end)
     if not inside.all():
         raise TimeRangeError(
-            f"end time {ends[np.argmin(inside)]:g} s is off the flight of '{system.name}'; choose times after "
-            f"{system.start:g} s up to {system.end:g} s"
+            f"end time {ends[np.argmin(inside)]:g} s is off the flight of '{system.name}'; choose times from "
+            f"{system.start:g} s to {system.end:g} s"
         )
     if not (np.diff(ends) > 0).all():
         raise TimeRangeError(f"end times must increase; look after {ends[np.argmin(np.diff(ends) > 0)]:g} s")

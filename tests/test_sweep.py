@@ -152,6 +152,17 @@ def test_end_times_do_not_change_each_other(as504):
     np.testing.assert_allclose(many.covariance[-1], one.covariance[0], rtol=1e-7)
 
 
+def test_end_time_at_the_start(as504):
+    engine, executable, _ = as504
+    run = AdjointSolver(executable, IntegratorOptions()).run(10.0)
+    alone = sweep(engine, executable, [10.0])
+    first = sweep(engine, executable, [10.0, 10.5, 12.0])
+    for result in (alone, first):
+        np.testing.assert_allclose(result.variance[0], run.variance, rtol=1e-12, atol=1e-30)
+        np.testing.assert_allclose(result.mean[0], run.mean, rtol=1e-12)
+    np.testing.assert_array_equal(first.covariance[1:], sweep(engine, executable, [10.5, 12.0]).covariance)
+
+
 def test_weighting_functions_are_the_adjoint_runs(as504):
     engine, executable, _ = as504
     found = sweep(engine, executable, [40.0, 107.0], relative_tolerance=1e-9, weighting_spacing=0.5).weighting
@@ -217,7 +228,7 @@ def test_tolerance_that_cannot_be_met(as504, tolerance):
     ("times", "text"),
     [
         ([], "at least one"),
-        ([10.0], "off the flight"),
+        ([9.9], "off the flight"),
         ([151.0], "off the flight"),
         ([float("nan")], "off the flight"),
         ([20.0, 15.0], "increase"),
