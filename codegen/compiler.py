@@ -66,7 +66,7 @@ def find_compiler() -> Compiler | None:
     for candidate in [shlex.split(named)] if named else [["cc"], ["gcc"], ["clang"]]:
         if shutil.which(candidate[0]):
             command = tuple(candidate)
-            return Compiler(command, _version(command), (*FLAGS, NATIVE) if _knows_native(command) else FLAGS)
+            return Compiler(command, _version(command), known_flags(command, (*FLAGS, NATIVE)))
         if named:
             raise CompilerError(candidate, 127, f"CC={named}: there is no such program")
     return None
@@ -79,9 +79,14 @@ def _version(command: tuple[str, ...]) -> str:
 
 
 @lru_cache
-def _knows_native(command: tuple[str, ...]) -> bool:
-    check = [*command, NATIVE, "-E", "-x", "c", "-"]
-    return subprocess.run(check, input="", capture_output=True, text=True, check=False).returncode == 0
+def known_flags(command: tuple[str, ...], flags: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the flags without those for a processor (-m...) that the compiler does not know."""
+
+    def knows(flag: str) -> bool:
+        check = [*command, flag, "-E", "-x", "c", "-"]
+        return subprocess.run(check, input="", capture_output=True, text=True, check=False).returncode == 0
+
+    return tuple(flag for flag in flags if not flag.startswith("-m") or knows(flag))
 
 
 @lru_cache
