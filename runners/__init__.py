@@ -1,5 +1,7 @@
 """Response statistics, checks, figures and the command line."""
 
+from .covariance import CovarianceOptions as CovarianceOptions
+from .ensemble import EnsembleOptions as EnsembleOptions
 from .integration import IntegratorOptions as IntegratorOptions
 from .statistics import ResponseStatistics as ResponseStatistics
 from .study import Study as Study

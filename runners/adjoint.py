@@ -86,12 +86,26 @@ class AdjointSolver:
         ------
         IntegrationError
         """
-        system = self._executable.system
-        r, s = len(system.outputs), len(system.sources)
-        counters = Counters()
+        s = len(self._executable.system.sources)
         scaled, G, inputs = self._terminal(time)
-        quadratures = np.zeros((r, s + 1))
-        for interval in reversed(intervals(system, system.start, time)):
+        scaled, quadratures, counters = self._backward(scaled, time, self._executable.system.start)
+        adjoint = scaled / self._state_scale[:, None] * self._output_scale
+        variance = quadratures[:, :s] * self._output_scale[:, None] ** 2
+        for k, covariance in enumerate(self._start_covariance):
+            variance[:, k] += np.einsum("ir,ij,jr->r", adjoint, covariance, adjoint)
+        mean = quadratures[:, s] * self._output_scale + G @ inputs
+        return AdjointRun(time, variance, mean, adjoint, counters.totals)
+
+    def steps(self, adjoint: NDArray[np.float64], time: float, earliest: float) -> int:
+        """Return the number of steps from ``time`` back to ``earliest`` (s) with adjoints (responses, n) at ``time``."""
+        scaled = (adjoint * self._state_scale).T / self._output_scale
+        return self._backward(scaled, time, earliest)[2].totals["nsteps"]
+
+    def _backward(self, scaled: NDArray, time: float, earliest: float) -> tuple[NDArray, NDArray, Counters]:
+        """Return scaled adjoints (n, responses) at ``earliest``, quadratures and counters."""
+        system, counters = self._executable.system, Counters()
+        quadratures = np.zeros((len(system.outputs), len(system.sources) + 1))
+        for interval in reversed(intervals(system, earliest, time)):
             parameters = self._executable.integrator_parameters(
                 interval.end, interval.end - interval.begin, interval.low, interval.high
             )
@@ -99,13 +113,8 @@ class AdjointSolver:
             states, integrals, statistics = self._integrator.run(scaled.ravel("F"), parameters, where)
             counters.add(statistics)
             scaled = states[:, -1].reshape(scaled.shape, order="F")
-            quadratures += integrals[:, -1].reshape(r, s + 1)
-        adjoint = scaled / self._state_scale[:, None] * self._output_scale
-        variance = quadratures[:, :s] * self._output_scale[:, None] ** 2
-        for k, covariance in enumerate(self._start_covariance):
-            variance[:, k] += np.einsum("ir,ij,jr->r", adjoint, covariance, adjoint)
-        mean = quadratures[:, s] * self._output_scale + G @ inputs
-        return AdjointRun(time, variance, mean, adjoint, counters.totals)
+            quadratures += integrals[:, -1].reshape(quadratures.shape)
+        return scaled, quadratures, counters
 
     def history(self, time: float, spacing: float) -> AdjointHistory:
         """Return adjoint and weighting functions at points at most ``spacing`` seconds apart."""

@@ -6,7 +6,7 @@ Var_s[y] = C P C'. Nothing here uses the adjoint or CVODES.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,9 +14,29 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from ..codegen.compiled import ExecutableSystem
+from ..codegen.evaluation import MatrixEvaluator
 from ..codegen.functions import state_scales
 from ..model.errors import IntegrationError
 from .integration import intervals
+
+
+@dataclass(frozen=True)
+class CovarianceOptions:
+    """How the covariance equation is integrated.
+
+    Parameters
+    ----------
+    relative_tolerance : float
+        Of every covariance, between 1e-13 and 1e-2.
+    """
+
+    relative_tolerance: float = 1e-9
+
+    def __post_init__(self):
+        if not 1e-13 <= self.relative_tolerance <= 1e-2:
+            raise IntegrationError(
+                f"a relative tolerance of {self.relative_tolerance:g} cannot be met; choose 1e-13 to 1e-2"
+            )
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +49,10 @@ class CovarianceResult:
 
 
 def covariance_equation(
-    executable: ExecutableSystem, times: Sequence[float], relative_tolerance: float = 1e-9
+    executable: ExecutableSystem,
+    times: Sequence[float],
+    relative_tolerance: float = 1e-9,
+    progress: Callable[[float], None] | None = None,
 ) -> CovarianceResult:
     """Integrate covariances of all sources and the mean with SciPy's DOP853.
 
@@ -42,6 +65,8 @@ def covariance_equation(
     relative_tolerance : float
         The absolute one is a ten-millionth of it, of scaled states: a source that hardly moves the vehicle has
         covariances many orders smaller than the wind's.
+    progress : callable, optional
+        Called with each time when it is reached.
 
     Raises
     ------
@@ -50,10 +75,15 @@ def covariance_equation(
     system = executable.system
     n, scale = len(system.states), state_scales(executable.system)
     sources = [system.noise_columns(source) for source in system.sources]
+    members = np.zeros((len(system.noises), len(sources)))
+    for k, columns in enumerate(sources):
+        members[columns, k] = 1.0
     start = [
         system.start_covariance_matrix(source, executable.parameters) / np.outer(scale, scale)
         for source in system.sources
     ]
+    matrices = MatrixEvaluator(executable, ("A", "B", "E", "inputs"))
+    outputs = MatrixEvaluator(executable, ("C", "G", "inputs"))
     y = np.concatenate([np.array(start).ravel(), np.zeros(n)])
     variances, means = [], []
     begin = system.start
@@ -61,15 +91,11 @@ def covariance_equation(
         for interval in intervals(system, begin, float(time)) if time > begin else []:
 
             def rate(t: float, y: NDArray, low: float = interval.low, high: float = interval.high) -> NDArray:
-                m = executable.matrices(t, low, high)
-                A = m["A"] * scale / scale[:, None]
-                B = m["B"] / scale[:, None]
-                P = y[:-n].reshape(len(sources), n, n)
-                half = A @ P
-                derivative = half + half.transpose(0, 2, 1)
-                for k, columns in enumerate(sources):
-                    derivative[k] += B[:, columns] @ B[:, columns].T
-                mean = A @ y[-n:] + (m["E"] @ m["inputs"][:, 0]) / scale
+                A, B, E, inputs = matrices(t, low, high)
+                A, B = A * scale / scale[:, None], B / scale[:, None]
+                half = A @ y[:-n].reshape(len(sources), n, n)
+                derivative = half + half.transpose(0, 2, 1) + (B * members.T[:, None, :]) @ B.T
+                mean = A @ y[-n:] + (E @ inputs[:, 0]) / scale
                 return np.concatenate([derivative.ravel(), mean])
 
             solution = solve_ivp(
@@ -84,9 +110,10 @@ def covariance_equation(
             y = solution.y[:, -1]
         begin = float(time)
         last = intervals(system, system.start, begin)[-1]
-        m = executable.matrices(begin, last.low, last.high)
-        C = m["C"] * scale
-        P = y[:-n].reshape(len(sources), n, n)
-        variances.append(np.einsum("ri,sij,rj->rs", C, P, C))
-        means.append(C @ y[-n:] + m["G"] @ m["inputs"][:, 0])
+        C, G, inputs = outputs(begin, last.low, last.high)
+        C = C * scale
+        variances.append(np.einsum("ri,sij,rj->rs", C, y[:-n].reshape(len(sources), n, n), C))
+        means.append(C @ y[-n:] + G @ inputs[:, 0])
+        if progress:
+            progress(begin)
     return CovarianceResult(np.asarray(times, float), np.array(variances), np.array(means))

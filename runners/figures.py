@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 
 from .output import write_whole
 from .statistics import COMBINED, ResponseStatistics
+from .tolerance import Measurement, Pace
 
 # what people read: label, factor from SI, unit
 DISPLAY = {
@@ -101,6 +102,63 @@ def weighting_figure(families: Sequence[xr.Dataset], response: str, unit: str, t
         panels[0, 0].set(xlim=(first, latest + 1))
         panels[-1, 0].set(xlabel="time of the wind impulse t (s)")
         figure.supylabel(f"g(t₂, t): {words(response)} at t₂ ({shown} per m/s · s)")
+        figure.suptitle(title)
+    return figure
+
+
+def sample_path_figure(ensemble: ResponseStatistics, statistics: ResponseStatistics, title: str) -> Figure:
+    """Return the sample paths of an ensemble within mean and mean ± 3 sigma computed without it."""
+    names = [str(name) for name in ensemble["response"].values]
+    with rc_context(STYLE):
+        figure = Figure(figsize=(8.0, 2.6 * len(names) + 1.0), layout="constrained")
+        panels = figure.subplots(len(names), sharex=True, squeeze=False)[:, 0]
+        for name, axes in zip(names, panels, strict=True):
+            factor, unit = display(str(ensemble["unit"].sel(response=name).item()))
+            paths = factor * ensemble["sample_path"].sel(response=name).values
+            axes.plot(ensemble["t"], paths.T, color="#7f8c9a", lw=0.5, alpha=0.7)
+            part = statistics.sel(response=name, source=COMBINED)
+            for side in (-3, 3):
+                label = "mean ± 3σ, adjoint" if side > 0 else None
+                edge = factor * (part["mean"] + side * part["std"])
+                axes.plot(statistics["time"], edge, "--", color=COLORS[COMBINED], lw=1.8, label=label)
+            axes.plot(statistics["time"], factor * part["mean"], color=COLORS["mean"], lw=1.8, label="mean")
+            axes.set_ylabel(f"{words(name)} ({unit})")
+        panels[0].plot([], [], color="#7f8c9a", label=f"{ensemble.sizes['path']} simulated flights")
+        panels[0].legend(loc="upper left")
+        panels[-1].set_xlabel("flight time (s)")
+        figure.suptitle(title)
+    return figure
+
+
+def tolerance_figure(measurements: Sequence[Measurement], paces: Sequence[Pace], title: str) -> Figure:
+    """Return error and run time against tolerance for each engine, and the steps over flight time with their limit."""
+    with rc_context(STYLE):
+        figure = Figure(figsize=(13.0, 4.8), layout="constrained")
+        error, seconds, steps = figure.subplots(1, 3)
+        for k, label in enumerate(dict.fromkeys(m.engine for m in measurements)):
+            rows = [m for m in measurements if m.engine == label]
+            tolerance = [m.tolerance for m in rows]
+            mark = {"marker": "osD^vP"[k % 6], "ms": 4.5, "color": f"C{k}", "label": label}
+            error.loglog(tolerance, [m.error for m in rows], **mark)
+            seconds.loglog(tolerance, [1e3 * m.seconds for m in rows], **mark)
+        ends = sorted({m.tolerance for m in measurements})
+        error.loglog(ends, ends, ":", color="black", label="error = tolerance")
+        error.set(xlabel="relative tolerance", ylabel="largest relative error of a σ")
+        seconds.set(xlabel="relative tolerance", ylabel="run time (ms)")
+        for axes in (error, seconds):
+            axes.invert_xaxis()
+        error.legend(fontsize=8.5)
+        edges = [paces[0].begin, *(p.end for p in paces)]
+        for values, label, color in (
+            ([p.newton_step for p in paces], "Adams, Newton", "C0"),
+            ([p.functional_step for p in paces], "Adams, functional", "C1"),
+            ([p.functional_limit for p in paces], "limit of functional iteration, 2 / |root|", "black"),
+        ):
+            line = ":" if color == "black" else "-"
+            steps.stairs([1e3 * v for v in values], edges, baseline=None, label=label, color=color, ls=line, lw=1.8)
+        steps.set(xlabel="flight time (s)", ylabel="mean step of CVODES (ms)")
+        steps.set_ylim(0, 1.35e3 * max(max(p.functional_limit, p.newton_step, p.functional_step) for p in paces))
+        steps.legend(fontsize=8.5)
         figure.suptitle(title)
     return figure
 

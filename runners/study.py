@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -19,13 +19,13 @@ from ..model.system import LinearSystem, Parameter
 from ..model.tables import table_values
 from ..model.vehicle import Vehicle, load_vehicle
 from .adjoint import AdjointSolver
+from .engines import Progress, compute_statistics
 from .integration import IntegratorOptions
 from .mean_response import with_mean_tables
 from .stability import Root, check_coupling, matrices_at, roots, warn_if_unstable
-from .statistics import ResponseStatistics, response_dataset, weighting_dataset
+from .statistics import ResponseStatistics, weighting_dataset
 from .wind_start import covariance_at
 
-Progress = Callable[[float], None]
 POSITIVE = ("correlation_time", "reference_area")
 
 
@@ -132,7 +132,9 @@ class Study:
         times: Iterable[float],
         *,
         responses: Iterable[str] | None = None,
-        options: IntegratorOptions | None = None,
+        engine: str = "cvodes",
+        options: object | None = None,
+        check: bool = False,
         progress: Progress | None = None,
     ) -> ResponseStatistics:
         """Return mean, variance, standard deviation and mean + 3 sigma by response, source and end time.
@@ -144,7 +146,14 @@ class Study:
         responses : iterable of str, optional
             All without it. White noise that reaches a response directly makes its variance infinite; leave that
             response out or colour the noise.
-        options : IntegratorOptions, optional
+        engine : str
+            'cvodes': one backward adjoint run an end time. 'covariance': the covariance equation, forward.
+            'ensemble': simulated flights, with confidence intervals.
+        options : IntegratorOptions, CovarianceOptions or EnsembleOptions, optional
+            As the engine takes.
+        check : bool
+            Compute everything a second time with a finer discretisation (tolerance, or substep of the ensemble) and
+            keep the relative difference of the standard deviation as ``discretisation_difference``.
         progress : callable, optional
             Called with each end time when it is done.
 
@@ -164,15 +173,8 @@ class Study:
         times = sorted({float(t) for t in times})
         self._check_times(times)
         wanted = self._responses(responses)
-        options = options or IntegratorOptions()
         warn_if_unstable(self.executable, times[-1])
-        solver = AdjointSolver(self.with_means, options)
-        runs = []
-        for time in times:
-            runs.append(solver.run(time))
-            if progress:
-                progress(time)
-        return response_dataset(self, runs, wanted, options)
+        return compute_statistics(self, times, wanted, engine, options, check, progress)
 
     def weighting_function(
         self, time: float, *, spacing: float = 0.05, options: IntegratorOptions | None = None

@@ -1,0 +1,213 @@
+"""Exact steps of a noise-driven linear system between grid points, by matrix exponentials.
+
+Over a substep h the state matrix is held in the manner of Magnus to fourth order (two Gauss points and their
+commutator; Blanes, Casas, Oteo and Ros, Physics Reports 470, 2009, section 5.4), which takes one matrix exponential,
+by scaling and squaring: many small ones at once, where SciPy's expm takes them one by one. The covariance that the
+noise adds, the integral of e^(A u) B B' e^(A' u) over the substep, is taken by Gauss-Legendre quadrature over the
+2^-m part of it and doubled m times: Q(2 d) = Q(d) + Phi(d) Q(d) Phi(d)'. Substeps compose without error. Nothing here
+integrates a differential equation, and no code is shared with the adjoint, CVODES or the sweep.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import matrix_balance
+
+from ..codegen.compiled import ExecutableSystem
+from ..codegen.ensemble import Steps
+from ..codegen.evaluation import MatrixEvaluator
+from ..codegen.functions import state_scales
+from ..model.errors import IntegrationError
+from .integration import Interval, intervals
+
+LARGEST_NORM = 0.5  # of an exponent whose series is summed; with TERMS terms it leaves less than 1e-14
+TERMS = 11
+TOGETHER = 512  # substeps computed at once
+POINTS, WEIGHTS = np.polynomial.legendre.leggauss(3)
+
+
+@dataclass(frozen=True, eq=False)
+class Discretisation:
+    """Steps, and the mean that goes with them.
+
+    Attributes
+    ----------
+    times : (k,) array
+        Ends of the steps, s.
+    steps : Steps
+        In states balanced by scales of their own.
+    added : (k, sources, n, n) array
+        Covariance that each source adds in a step, scaled.
+    mean : (k, n_y) array
+        Response to the known inputs alone.
+    """
+
+    times: NDArray[np.float64]
+    steps: Steps
+    added: NDArray[np.float64]
+    mean: NDArray[np.float64]
+
+    def variance(self) -> NDArray[np.float64]:
+        """Return the variance of the responses that infinitely many runs would have, (k, n_y, sources)."""
+        P = self.steps.start @ self.steps.start.transpose(0, 2, 1)
+        found = []
+        for Phi, Q, C in zip(self.steps.transition, self.added, self.steps.output, strict=True):
+            P = Phi @ P @ Phi.T + Q
+            found.append(np.einsum("ri,sij,rj->rs", C, P, C))
+        return np.array(found)
+
+
+def discretise(executable: ExecutableSystem, times: Sequence[float], substep: float) -> Discretisation:
+    """Return the exact steps from the start of the system through ``times``.
+
+    Parameters
+    ----------
+    executable : ExecutableSystem
+        With its tables of the mean response filled in.
+    times : sequence of float
+        Grid points after the start, increasing, s; one on a discontinuity is taken from the left.
+    substep : float
+        Largest span over which the matrices are taken as linear in time, s.
+
+    Raises
+    ------
+    IntegrationError
+        If the system grows beyond the range of numbers.
+    """
+    system, scale = executable.system, _balanced_scales(executable)
+    n, s = len(system.states), len(system.sources)
+    rates = MatrixEvaluator(executable, ("A", "B", "E", "inputs"))
+    outputs = MatrixEvaluator(executable, ("C", "G", "inputs"))
+    columns = [system.noise_columns(source) for source in system.sources]
+    pieces = [
+        (number, interval)
+        for number, (begin, end) in enumerate(pairwise([system.start, *map(float, times)]))
+        for interval in (intervals(system, begin, end) if end > begin else [])
+    ]
+    substeps = _substeps(rates, [interval for _, interval in pieces], scale, columns, substep)
+    transition = np.tile(np.eye(n), (len(times), 1, 1))
+    added, forced = np.zeros((len(times), s, n, n)), np.zeros((len(times), n))
+    for (number, _), part in zip(pieces, substeps, strict=True):
+        before = transition[number], added[number], forced[number]
+        transition[number], added[number], forced[number] = _compose(before, part)
+    C, mean, state = [], [], np.zeros(n)
+    for time, Phi, Q, b in zip(times, transition, added, forced, strict=True):
+        if not (np.isfinite(Phi).all() and np.isfinite(Q).all()):
+            raise IntegrationError(
+                f"the transition before {time:g} s left the range of numbers; the system grows without "
+                "bound there or a table holds an impossible value (see 'ascentwind inspect')"
+            )
+        state = Phi @ state + b
+        last = intervals(system, system.start, float(time))[-1]
+        y, G, inputs = outputs(float(time), last.low, last.high)
+        C.append(y * scale)
+        mean.append(C[-1] @ state + G @ inputs[:, 0])
+    start = [system.start_covariance_matrix(name, executable.parameters) for name in system.sources]
+    steps = Steps(_root(np.array(start) / np.outer(scale, scale)), transition, _root(added), np.array(C))
+    return Discretisation(np.asarray(times, float), steps, added, np.array(mean))
+
+
+def _balanced_scales(executable: ExecutableSystem) -> NDArray[np.float64]:
+    """Return scales of the states that make the state matrix small, so that exponentials need few squarings."""
+    system, scale = executable.system, state_scales(executable.system)
+    first = intervals(system, system.start, min(system.end, system.start + 100.0))[0]
+    (A,) = MatrixEvaluator(executable, ("A",))(0.5 * (first.begin + first.end), first.low, first.high)
+    _, (balance, _) = matrix_balance(A * scale / scale[:, None], permute=False, separate=True)
+    return scale * balance
+
+
+def _substeps(
+    rates: MatrixEvaluator,
+    pieces: list[Interval],
+    scale: NDArray,
+    columns: list[list[int]],
+    substep: float,
+) -> Iterator[tuple[NDArray, NDArray, NDArray]]:
+    """Yield transition matrix, added covariances and added mean of each piece, which holds no jump."""
+    n = scale.size
+    counts = [2 ** max(0, int(np.ceil(np.log2((p.end - p.begin) / substep) - 1e-9))) for p in pieces]
+    ends = np.cumsum(counts)
+    together = [np.flatnonzero((ends - 1) // TOGETHER == block) for block in range(sum(counts) // TOGETHER + 1)]
+    for members in together:
+        if not members.size:
+            continue
+        h = np.concatenate([np.full(counts[i], (pieces[i].end - pieces[i].begin) / counts[i]) for i in members])
+        M, B = np.zeros((2, h.size, n + 1, n + 1)), np.zeros((2, h.size, n, sum(map(len, columns))))
+        number = 0
+        for i in members:
+            for k in range(counts[i]):
+                for g, offset in enumerate((0.5 - np.sqrt(3) / 6, 0.5 + np.sqrt(3) / 6)):
+                    t = pieces[i].begin + (k + offset) * h[number]
+                    A, noise, E, inputs = rates(t, pieces[i].low, pieces[i].high)
+                    M[g, number, :n, :n] = A * scale / scale[:, None]
+                    M[g, number, :n, n] = E @ inputs[:, 0] / scale
+                    B[g, number] = noise / scale[:, None]
+                number += 1
+        wide = h[:, None, None]
+        exponent = 0.5 * wide * (M[0] + M[1]) + np.sqrt(3) / 12 * wide**2 * (M[1] @ M[0] - M[0] @ M[1])
+        Phi, Q = _added_covariance(exponent, 0.5 * (B[0] + B[1]) * np.sqrt(wide), columns)
+        begin = 0
+        for i in members:
+            part = tuple(a[begin : begin + counts[i]] for a in (Phi[:, :n, :n], Q, Phi[:, :n, n]))
+            begin += counts[i]
+            while part[0].shape[0] > 1:
+                part = _compose(tuple(a[::2] for a in part), tuple(a[1::2] for a in part))
+            yield part[0][0], part[1][0], part[2][0]
+
+
+def _added_covariance(
+    exponent: NDArray, B: NDArray, columns: list[list[int]]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return e^exponent (k, n + 1, n + 1) and the covariances (k, sources, n, n) added over a substep.
+
+    ``B`` comes multiplied by the square root of the span.
+    """
+    n = B.shape[1]
+    norm = np.abs(exponent[:, :n, :n]).sum(axis=1).max()
+    doublings = max(0, int(np.ceil(np.log2(max(norm, 1e-12) / LARGEST_NORM))))
+    part = exponent / 2**doublings
+    Q = np.zeros((B.shape[0], len(columns), n, n))
+    for point, weight in zip(POINTS, WEIGHTS, strict=True):
+        carried = _exponential(0.5 * (1 + point) * part[:, :n, :n]) @ B
+        for s, of_source in enumerate(columns):
+            b = carried[:, :, of_source]
+            Q[:, s] += 0.5 * weight / 2**doublings * (b @ b.transpose(0, 2, 1))
+    Phi = _exponential(part)
+    for _ in range(doublings):
+        A = Phi[:, None, :n, :n]
+        Q = Q + A @ Q @ A.swapaxes(2, 3)
+        Phi = Phi @ Phi
+    return Phi, Q
+
+
+def _exponential(X: NDArray) -> NDArray[np.float64]:
+    """Return e^X of many small matrices by its Taylor series."""
+    unit = np.eye(X.shape[-1])
+    found = unit + X / TERMS
+    for k in range(TERMS - 1, 0, -1):
+        found = unit + X @ found / k
+    return found
+
+
+def _compose(first: tuple[NDArray, ...], second: tuple[NDArray, ...]) -> tuple[NDArray, NDArray, NDArray]:
+    """Return one step out of two (or arrays of them)."""
+    (Phi1, Q1, b1), (Phi2, Q2, b2) = first, second
+    A = Phi2[..., None, :, :]
+    return Phi2 @ Phi1, A @ Q1 @ A.swapaxes(-1, -2) + Q2, (Phi2 @ b1[..., None])[..., 0] + b2
+
+
+def _root(Q: NDArray) -> NDArray[np.float64]:
+    """Return the symmetric square roots of covariance matrices; unlike other roots they are unique."""
+    size = np.sqrt(np.maximum(np.einsum("...ii->...i", Q), 0.0))
+    unit = np.where(size > 0, size, 1.0)
+    weight = unit[..., :, None] * unit[..., None, :]
+    values, vectors = np.linalg.eigh(0.5 * (Q + Q.swapaxes(-1, -2)) / weight)
+    root = (vectors * np.sqrt(np.maximum(values, 0.0))[..., None, :]) @ vectors.swapaxes(-1, -2)
+    root = unit[..., :, None] * root
+    root[(Q == 0).all(axis=-1)] = 0.0
+    return np.where((Q == 0).all(axis=-2)[..., None, :], 0.0, root)

@@ -1,0 +1,220 @@
+"""The ensemble: many flights through random wind, the report's conventional method, with confidence intervals.
+
+By linearity each source drives a vehicle of its own and the sum flies through all of them, so that one set of runs
+gives the spread by source and combined. Runs are stepped exactly between end times (runners/discretisation.py); what
+remains is the sampling error, which the intervals show.
+"""
+
+from __future__ import annotations
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2, t
+
+from ..codegen.compiled import ExecutableSystem
+from ..codegen.ensemble import compiled_ensemble
+from ..model.errors import AscentwindError
+from .discretisation import discretise
+from .statistics import provenance, statistics_dataset
+
+if TYPE_CHECKING:
+    from .statistics import ResponseStatistics
+    from .study import Study
+
+FEWEST_RUNS = 10
+CHUNK = 512  # runs a thread takes at a time; sums are added in the order of chunks, whatever the number of threads
+
+
+class EnsembleOptionsError(AscentwindError):
+    """An ensemble cannot be run as asked."""
+
+
+@dataclass(frozen=True)
+class EnsembleOptions:
+    """How an ensemble is run.
+
+    Parameters
+    ----------
+    runs : int
+        At least 10, below which an interval says nothing.
+    seed : int
+        Of the noise, 0 to 2^64 - 1. The same seed gives the same numbers with any number of threads.
+    confidence : float
+        Of the intervals, between 0 and 1.
+    paths : int
+        Runs kept as sample paths, all sources together.
+    path_spacing : float
+        Largest distance between points of a path, s.
+    threads : int, optional
+        All cores without it.
+    substep : float
+        Over which the matrices are taken as linear in time, s.
+    """
+
+    runs: int = 500
+    seed: int = 504
+    confidence: float = 0.9
+    paths: int = 0
+    path_spacing: float = 0.1
+    threads: int | None = None
+    substep: float = 0.05
+
+    def __post_init__(self):
+        cores = available_cores()
+        if self.runs < FEWEST_RUNS:
+            raise EnsembleOptionsError(
+                f"{self.runs} runs are too few for a confidence interval; take {FEWEST_RUNS} or more (the report: 500)"
+            )
+        if not 0 <= self.seed < 2**64:
+            raise EnsembleOptionsError(f"the seed {self.seed} does not fit; choose 0 to 2^64 - 1")
+        if not 0 < self.confidence < 1:
+            raise EnsembleOptionsError(f"a confidence of {self.confidence:g} means nothing; choose 0.9 or the like")
+        if not 0 <= self.paths <= self.runs:
+            raise EnsembleOptionsError(f"{self.paths} paths cannot be kept of {self.runs} runs")
+        if not (self.path_spacing > 0 and self.substep > 0):
+            raise EnsembleOptionsError("path_spacing and substep must be positive times in seconds")
+        if self.threads is not None and not 1 <= self.threads <= cores:
+            raise EnsembleOptionsError(f"{self.threads} threads were asked for and there are {cores} cores")
+
+
+@dataclass(frozen=True, eq=False)
+class Ensemble:
+    """Statistics of a set of runs.
+
+    Attributes
+    ----------
+    times : (k,) array
+        s.
+    runs : int
+    known_mean : (k, responses) array
+        Response to the known inputs.
+    moments : (k, responses, sources + 1, 2) array
+        Sums of deviation and squared deviation over the runs; the last source is all together.
+    path_times : (m,) array
+    paths : (paths, m, responses) array
+        Known mean and deviation, all sources together.
+    """
+
+    times: NDArray[np.float64]
+    runs: int
+    known_mean: NDArray[np.float64]
+    moments: NDArray[np.float64]
+    path_times: NDArray[np.float64]
+    paths: NDArray[np.float64]
+
+    @property
+    def mean(self) -> NDArray[np.float64]:
+        """Sample mean by source, (k, responses, sources + 1)."""
+        return self.known_mean[:, :, None] + self.moments[..., 0] / self.runs
+
+    @property
+    def variance(self) -> NDArray[np.float64]:
+        """Sample variance by source, unbiased, (k, responses, sources + 1)."""
+        total, squares = self.moments[..., 0], self.moments[..., 1]
+        return (squares - total**2 / self.runs) / (self.runs - 1)
+
+
+def run_ensemble(executable: ExecutableSystem, times: list[float], options: EnsembleOptions) -> Ensemble:
+    """Fly all runs.
+
+    Parameters
+    ----------
+    executable : ExecutableSystem
+        With its tables of the mean response filled in.
+    times : list of float
+        End times, increasing, s.
+    options : EnsembleOptions
+
+    Raises
+    ------
+    EnsembleNeedsCompilerError, CompilerError, IntegrationError
+    """
+    system = executable.system
+    grid = np.asarray(times, float)
+    if options.paths:
+        count = max(1, int(np.ceil((times[-1] - system.start) / options.path_spacing - 1e-9)))
+        grid = np.union1d(grid, np.linspace(system.start, times[-1], count + 1)[:-1])
+    found = discretise(executable, grid.tolist(), options.substep)
+    engine = compiled_ensemble(system)
+    firsts = range(0, options.runs, CHUNK)
+
+    def chunk(first: int) -> tuple[NDArray, NDArray | None]:
+        size = min(CHUNK, options.runs - first)
+        return engine.run(found.steps, options.seed, first, size, keep_paths=first < options.paths)
+
+    with ThreadPoolExecutor(options.threads or available_cores()) as pool:
+        results = list(pool.map(chunk, firsts))
+    at = np.searchsorted(grid, times)
+    deviations = [paths for _, paths in results if paths is not None]
+    paths = np.concatenate(deviations)[: options.paths] if deviations else np.empty((0, grid.size, len(system.outputs)))
+    moments = np.sum([sums for sums, _ in results], axis=0)
+    return Ensemble(
+        grid[at], options.runs, found.mean[at], moments[at], grid if options.paths else grid[:0],
+        paths + found.mean if options.paths else paths[:, :0],
+    )  # fmt: skip
+
+
+def mean_interval(
+    mean: NDArray, std: NDArray, runs: int, confidence: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the confidence interval of a mean by Student's t.
+
+    m -+ t_{n-1; (1+c)/2} s / sqrt(n); Bendat and Piersol, Random Data, 4th edition, 2010, section 4.4.
+    """
+    half = t.ppf(0.5 * (1 + confidence), runs - 1) * std / np.sqrt(runs)
+    return mean - half, mean + half
+
+
+def std_interval(std: NDArray, runs: int, confidence: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the confidence interval of a standard deviation by chi-square.
+
+    s sqrt((n-1) / chi2_{n-1; (1+c)/2}) to s sqrt((n-1) / chi2_{n-1; (1-c)/2}); Bendat and Piersol, Random Data,
+    4th edition, 2010, section 4.4. Exact for normal runs, which a linear system under normal noise has.
+    """
+    low, high = chi2.ppf([0.5 * (1 + confidence), 0.5 * (1 - confidence)], runs - 1)
+    return std * np.sqrt((runs - 1) / low), std * np.sqrt((runs - 1) / high)
+
+
+def ensemble_dataset(
+    study: Study, times: list[float], responses: list[str], options: EnsembleOptions
+) -> ResponseStatistics:
+    """Return the statistics of an ensemble as a dataset.
+
+    Besides the variables of every engine: ``mean_low``, ``mean_high``, ``std_low``, ``std_high``, the confidence
+    intervals; with paths kept, ``sample_path`` over (path, t, response).
+    """
+    rows = [study.system.output_index(name) for name in responses]
+    found = run_ensemble(study.with_means, times, options)
+    variance = found.variance[:, rows]
+    attributes = provenance(study) | {
+        "engine": "ensemble", "runs": options.runs, "seed": options.seed, "confidence": options.confidence,
+        "substep_s": options.substep,
+    }  # fmt: skip
+    dataset = statistics_dataset(study, times, responses, found.known_mean[:, rows], variance[..., :-1], attributes)
+    # sampled all together, the sources are not exactly uncorrelated, nor is the mean exactly the known one
+    mean, std = found.mean[:, rows], np.sqrt(variance)
+    dims = ("time", "response", "source")
+    for name, values in (("mean", mean), ("variance", variance), ("std", std), ("mean_plus_3sigma", mean + 3 * std)):
+        dataset[name] = (dims, values, dataset[name].attrs)
+    for name, (low, high) in (
+        ("mean", mean_interval(mean, std, options.runs, options.confidence)),
+        ("std", std_interval(std, options.runs, options.confidence)),
+    ):
+        for side, values in (("low", low), ("high", high)):
+            label = f"{side} end of the {options.confidence:.0%} confidence interval of {name}"
+            dataset[f"{name}_{side}"] = (dims, values, dataset[name].attrs | {"long_name": label})
+    if options.paths:
+        label = {"long_name": "sample paths, all sources together", "units": dataset["mean"].attrs["units"]}
+        dataset["sample_path"] = (("path", "t", "response"), found.paths[:, :, rows], label)
+        dataset = dataset.assign_coords(t=("t", found.path_times, {"units": "s", "long_name": "flight time"}))
+    return dataset
+
+
+def available_cores() -> int:
+    """Return the number of processors that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
