@@ -18,7 +18,7 @@ import platformdirs
 from filelock import FileLock, Timeout
 
 from ..model.errors import AscentwindError, AscentwindWarning
-from .compiler import FLAGS, Compiler, processor
+from .compiler import Compiler, processor
 
 log = logging.getLogger(__name__)
 
@@ -76,7 +76,7 @@ def content_key(fingerprint: str, compiler: Compiler) -> str:
 
     ``fingerprint`` stands for the C source: it hashes all that the source is written from, and is quicker to have.
     """
-    parts = (fingerprint, *compiler.command, compiler.version, *FLAGS, processor(), ca.CasadiMeta.version())
+    parts = (fingerprint, *compiler.command, compiler.version, *compiler.flags, processor(), ca.CasadiMeta.version())
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]
 
 

@@ -168,8 +168,10 @@ def difference_from_core(executable: ExecutableSystem, points: int = 2, seed: in
         ]
         for ours, reference in pairs:
             a, b = ca.DM(ours).full(), ca.DM(reference).full()
-            if b.size:
-                difference = float(np.abs(a - b).max()) / max(1e-300, float(np.abs(b).max()))
+            differ = ~((a == b) | (np.isnan(a) & np.isnan(b)))
+            if differ.any():
+                scale = max(1e-300, float(np.abs(b[np.isfinite(b)]).max(initial=0.0)))
+                difference = float(np.abs(a[differ] - b[differ]).max()) / scale
                 largest = difference if not difference <= largest else largest
     return largest
 

@@ -70,6 +70,25 @@ def c_function(
         An operation without a C equivalent above.
     """
     arguments = [f"const double *{i}" for i in inputs] + [f"double *restrict {o}" for o in outputs]
+    lines = c_statements(function, inputs, outputs, names)
+    unused = [f"(void){o};" for o in outputs if not any(line.startswith(f"{o}[") for line in lines)]
+    unused += [f"(void){i};" for i in inputs if not any(re.search(rf"\b{i}\[", line) for line in lines)]
+    body = "\n  ".join(unused + lines)
+    return f"static void {name}({', '.join(arguments)}) {{\n  {body}\n}}\n"
+
+
+def c_statements(
+    function: ca.Function,
+    inputs: Sequence[str],
+    outputs: Sequence[str],
+    names: Mapping[str, Sequence[str]],
+    lanes: Mapping[str, str] | None = None,
+) -> list[str]:
+    """Return the assignments of ``c_function``, one an operation.
+
+    ``lanes`` gives a second index to those inputs and outputs that hold several points side by side.
+    """
+    lanes = {name: f"[{lane}]" for name, lane in (lanes or {}).items()}
     lines: list[str] = []
     values: dict[int, str] = {}
     count = 0
@@ -79,11 +98,12 @@ def c_function(
         if operation == ca.OP_INPUT:
             argument = inputs[of[0]]
             index = names[argument][of[1]] if argument in names else str(of[1])
-            values[into[0]] = f"{argument}[{index}]"
+            values[into[0]] = f"{argument}[{index}]{lanes.get(argument, '')}"
         elif operation == ca.OP_CONST:
             values[into[0]] = _number(function.instruction_constant(k))
         elif operation == ca.OP_OUTPUT:
-            lines.append(f"{outputs[into[0]]}[{into[1]}] = {values[of[0]]};")
+            result = outputs[into[0]]
+            lines.append(f"{result}[{into[1]}]{lanes.get(result, '')} = {values[of[0]]};")
         else:
             form = _UNARY.get(operation) if len(of) == 1 else _BINARY.get(operation)
             if form is None:
@@ -94,10 +114,7 @@ def c_function(
             lines.append(f"const double a{count} = {form.format(*(values[i] for i in of))};")
             values[into[0]] = f"a{count}"
             count += 1
-    unused = [f"(void){o};" for o in outputs if not any(line.startswith(f"{o}[") for line in lines)]
-    unused += [f"(void){i};" for i in inputs if not any(re.search(rf"\b{i}\[", line) for line in lines)]
-    body = "\n  ".join(unused + lines)
-    return f"static void {name}({', '.join(arguments)}) {{\n  {body}\n}}\n"
+    return lines
 
 
 def enumerators(prefix: str, names: Sequence[str]) -> list[str]:

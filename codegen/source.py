@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import fields
-from pathlib import Path
 from typing import Any
 
 import casadi as ca
@@ -13,6 +11,7 @@ import numpy as np
 
 from ..model.system import LinearSystem
 from .expressions import c_function, enumerators
+from .fingerprint import fingerprint
 from .functions import INPUTS, INTERVAL, MATRICES, OUTPUTS, CoreFunctions, state_scales
 
 _ENVIRONMENT = jinja2.Environment(
@@ -131,20 +130,9 @@ def c_source(system: LinearSystem, core: CoreFunctions) -> str:
 
 
 def source_fingerprint(system: LinearSystem, core: CoreFunctions) -> str:
-    """Return a hash of all that ``c_source`` writes from: the arithmetic, the names, and this code itself."""
-    here = Path(__file__).parent
-    digest = hashlib.sha256()
-    for field in fields(core):
-        digest.update(getattr(core, field.name).serialize().encode())
-    for part in (system.name, system.structure, system.states, system.noises, system.outputs):
-        digest.update(repr(part).encode())
-    for p in system.parameters:
-        digest.update(repr((p.name, p.unit)).encode())
-    for g in system.tables:
-        digest.update(repr((g.name, g.argument, g.names, g.units, g.knots.size)).encode())
-    for file in ("source.py", "expressions.py", "templates/system.c.jinja"):
-        digest.update((here / file).read_bytes())
-    return digest.hexdigest()
+    """Return a hash of all that ``c_source`` writes from."""
+    functions = (getattr(core, field.name) for field in fields(core))
+    return fingerprint(system, functions, ("source.py", "expressions.py", "templates/system.c.jinja"))
 
 
 def _integrand_interface(

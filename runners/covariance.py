@@ -63,7 +63,8 @@ def covariance_equation(
     times : sequence of float
         Increasing, s.
     relative_tolerance : float
-        Of every covariance; absolute a thousandth of it, of states scaled to be of the order of one.
+        The absolute one is a ten-millionth of it, of scaled states: a source that hardly moves the vehicle has
+        covariances many orders smaller than the wind's.
     progress : callable, optional
         Called with each time when it is reached.
 
@@ -99,7 +100,7 @@ def covariance_equation(
 
             solution = solve_ivp(
                 rate, (interval.begin, interval.end), y, method="DOP853",
-                rtol=relative_tolerance, atol=1e-3 * relative_tolerance,
+                rtol=relative_tolerance, atol=1e-7 * relative_tolerance,
             )  # fmt: skip
             if not solution.success or not np.isfinite(solution.y[:, -1]).all():
                 raise IntegrationError(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -75,8 +76,14 @@ def mean_response(executable: ExecutableSystem, times: NDArray[np.float64]) -> M
     return MeanResponse(times, np.array(states), np.concatenate(outputs))
 
 
-def with_mean_tables(executable: ExecutableSystem) -> ExecutableSystem:
-    """Return the system with its tables of the mean response filled in, if it has any."""
+def with_mean_tables(
+    executable: ExecutableSystem,
+    respond: Callable[[ExecutableSystem, NDArray[np.float64]], MeanResponse] = mean_response,
+) -> ExecutableSystem:
+    """Return the system with its tables of the mean response filled in, if it has any.
+
+    ``respond`` computes the mean at given times: CVODES, or the sweep's own.
+    """
     system = executable.system
     at = next(
         (i for i, g in enumerate(executable.groups) if g.name == "mean" and set(g.names) == set(MEAN_TABLES)), None
@@ -84,7 +91,7 @@ def with_mean_tables(executable: ExecutableSystem) -> ExecutableSystem:
     if at is None:
         return executable
     group = executable.groups[at]
-    mean = mean_response(executable, group.knots)
+    mean = respond(executable, group.knots)
     columns = []
     for name in group.names:
         kind, what = MEAN_TABLES[name]

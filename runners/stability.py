@@ -5,12 +5,13 @@ from __future__ import annotations
 import warnings
 from dataclasses import dataclass
 
+import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from ..codegen.compiled import ExecutableSystem
 from ..model.errors import DataError, SingularCouplingError, UnstableSystemWarning
-from ..model.tables import TableGroup, table_values
+from ..model.tables import table_values
 from .integration import intervals
 
 UNSTABLE = 1e-6  # rad/s; a real part below is rounding or an integrator
@@ -87,7 +88,7 @@ def warn_if_unstable(executable: ExecutableSystem, end: float, checks: int = 12)
         return
 
 
-def check_coupling(executable: ExecutableSystem, groups: tuple[TableGroup, ...]) -> None:
+def check_coupling(executable: ExecutableSystem) -> None:
     """Refuse a vehicle whose bending and slosh masses do not make a positive definite mass matrix.
 
     Raises
@@ -95,14 +96,12 @@ def check_coupling(executable: ExecutableSystem, groups: tuple[TableGroup, ...])
     SingularCouplingError
         Names the time and the mass that is too large.
     """
-    import casadi as ca
-
     system = executable.system
     if system.coupling_matrix is None or not system.tables or system.coupling_matrix.shape[0] == 0:
         return
     matrix = ca.Function("coupling", [system.v, system.p], [ca.densify(system.coupling_matrix)])
     for time in np.linspace(system.start, system.end, 60):
-        values = np.array(list(table_values(groups, float(time)).values()))
+        values = np.array(list(table_values(system.tables, float(time)).values()))
         M = matrix(values, executable.parameters).full()
         smallest = np.linalg.eigvalsh(M / np.sqrt(np.outer(*(2 * [np.abs(np.diag(M)) + 1e-300])))).min()
         if not smallest > 1e-9:

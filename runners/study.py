@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..codegen.compiled import ExecutableSystem, executable_system
 from ..model.assemble import assemble
-from ..model.errors import DirectNoiseError, TimeRangeError, UnknownNameError
+from ..model.errors import DirectNoiseError, ParameterValueError, TimeRangeError, UnknownNameError
 from ..model.library import find_vehicle
 from ..model.system import LinearSystem, Parameter
 from ..model.tables import table_values
@@ -68,7 +68,7 @@ class Study:
         altitude = float(vehicle.tables["altitude"].polynomial(vehicle.start))
         system = assemble(vehicle, covariance_at(vehicle.wind.shaping_filter, altitude))
         executable = executable_system(system, compile)
-        check_coupling(executable, system.tables)
+        check_coupling(executable)
         return Study(executable, vehicle)
 
     @staticmethod
@@ -94,7 +94,7 @@ class Study:
         ------
         UnknownNameError
             With the nearest parameter name.
-        ValueError
+        ParameterValueError
             For a value that is not finite, or a time or area that is not positive.
         """
         names, values = self.system.parameter_names, self.executable.parameters.copy()
@@ -102,7 +102,7 @@ class Study:
             if name not in names:
                 raise UnknownNameError("parameter", name, names)
             if not np.isfinite(value) or (name.rpartition(".")[2] in POSITIVE and value <= 0):
-                raise ParameterValueError(name, value)
+                raise ParameterValueError(f"parameter '{name}' cannot be {value:g}; give a finite, sensible number")
             values[names.index(name)] = float(value)
         return Study(self.executable.with_numbers(parameters=values), self.vehicle)
 
@@ -233,10 +233,3 @@ class Study:
                         "infinite; colour the noise (white = false with a correlation time) or leave the response out"
                     )
         return names
-
-
-class ParameterValueError(UnknownNameError, ValueError):
-    """A parameter value that the equations cannot use."""
-
-    def __init__(self, name: str, value: float):
-        Exception.__init__(self, f"parameter '{name}' cannot be {value:g}; give a finite number above its limit")

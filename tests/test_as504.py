@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import xarray as xr
-from ascentwind.model.errors import TimeRangeError, UnknownNameError
+from ascentwind.model.errors import ParameterValueError, TimeRangeError, UnknownNameError
 from ascentwind.runners import IntegratorOptions, Study
 from ascentwind.runners.covariance import covariance_equation
 from ascentwind.runners.mean_response import mean_response
-from ascentwind.runners.study import ParameterValueError
 
 TIMES = (40.0, 60.0, 75.0, 90.0, 105.6, 140.0)  # 105.6 s is a gain switch, seen from the left
 
@@ -33,6 +32,17 @@ def test_adjoint_meets_the_covariance_equation(as504, forward, method, iteration
 def test_the_default_tolerance_keeps_the_promise(as504, forward):
     found = as504.response_statistics(TIMES[:4])
     np.testing.assert_allclose(found.variance.values[:, :, :3], forward.variance[:4], rtol=1e-5)
+
+
+def test_an_end_time_on_a_discontinuity_is_seen_from_the_left(as504):
+    """At engine cutoff thrust and axial acceleration jump, and the bending moment with them."""
+    options = IntegratorOptions(relative_tolerance=1e-9)
+    at, before, after = (
+        as504.response_statistics([time], options=options).std.sel(response="bending_moment").values
+        for time in (134.34, 134.34 - 1e-7, 134.34 + 1e-7)
+    )
+    np.testing.assert_allclose(at, before, rtol=1e-6)
+    assert (np.abs(after / before - 1) > 1e-4).any()
 
 
 def test_convolved_mean_is_the_forward_mean(as504):

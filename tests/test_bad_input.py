@@ -55,6 +55,8 @@ SPOILED = [
     pytest.param("vehicle.toml", "value = [0.651,", "value = [1.651,", r"short_fraction between 0 and 1", id="fraction above one"),
     pytest.param("vehicle.toml", "format = 1", "format = [", r"vehicle.toml: is not valid TOML", id="broken TOML"),
     pytest.param("wind_march_zonal.csv", "1000,2.64,6.85", "1000,2.64,-6.85", r"column 'standard_deviation', line 5: -6.85 is not positive", id="negative sigma"),
+    pytest.param("trajectory.csv", "\n60,5992.99,", "\n60,7992.99,", r"trajectory.csv, column 'altitude', t = 6[01][.\d]* s: does not increase", id="altitude falls"),
+    pytest.param(RIGID, "\n100,1584150,", "\n100,1e12,", r"rigid_body.csv, column 'mass', t = [\d.]+ s: the interpolation between rows is not positive.*pchip", id="overshoot"),
 ]  # fmt: skip
 
 

@@ -1,0 +1,287 @@
+"""All end times in one pass: the generated sweep integrator alone, with weighting functions, and in batches."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..codegen.compiled import ExecutableSystem
+from ..codegen.sweep import CompiledSweep, Segments
+from ..model.errors import DirectNoiseError, IntegrationError, TimeRangeError
+from ..model.system import LinearSystem
+from .integration import intervals
+from .mean_response import MeanResponse, with_mean_tables
+
+LONGEST_SEGMENT = 1.0  # s; weights of the error control are renewed and the Gramians stay well scaled
+LEAST_TOLERANCE, LARGEST_TOLERANCE = 1e-12, 1e-2
+
+
+@dataclass(frozen=True, eq=False)
+class WeightingFunctions:
+    """The adjoint of every response and end time at the ends of the segments, from the backward sweep.
+
+    Attributes
+    ----------
+    times : (m,) array
+        s.
+    noise : (k, m, responses, noises) array
+        g(t2, t) = B' lambda for each end time; zero after the end time.
+    inputs : (k, m, responses, inputs) array
+        E' lambda, without the delta that G puts at t = t2.
+    """
+
+    times: NDArray[np.float64]
+    noise: NDArray[np.float64]
+    inputs: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class SweepResult:
+    """Statistics of all responses at all end times.
+
+    Attributes
+    ----------
+    times : (k,) array
+        End times, s.
+    covariance : (k, sources, responses, responses) array
+        Between the responses, each source by itself.
+    mean : (k, responses) array
+    error_estimate : (k, sources, responses) array
+        Relative error of the standard deviation, from the embedded formulas.
+    counters : dict
+        Steps, rejected steps, evaluations of the state matrix.
+    weighting : WeightingFunctions or None
+    """
+
+    times: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+    mean: NDArray[np.float64]
+    error_estimate: NDArray[np.float64]
+    counters: dict[str, int]
+    weighting: WeightingFunctions | None = None
+
+    @property
+    def variance(self) -> NDArray[np.float64]:
+        """Variance by end time, response and source, (k, responses, sources)."""
+        return np.einsum("ksrr->krs", self.covariance)
+
+
+def sweep(
+    engine: CompiledSweep,
+    executable: ExecutableSystem,
+    times: ArrayLike,
+    *,
+    relative_tolerance: float = 1e-6,
+    weighting_spacing: float | None = None,
+) -> SweepResult:
+    """Sweep once over the flight for all end times.
+
+    Parameters
+    ----------
+    engine : CompiledSweep
+    executable : ExecutableSystem
+        Numbers: parameters, and tables with those of the mean response filled in.
+    times : (k,) array
+        End times, increasing, from the start on, s. One that falls on a discontinuity is taken from the left.
+    relative_tolerance : float
+        Of every standard deviation, between 1e-12 and 1e-2.
+    weighting_spacing : float, optional
+        Keep the weighting functions at points at most this many seconds apart.
+
+    Raises
+    ------
+    TimeRangeError, DirectNoiseError, IntegrationError, DataError
+    """
+    system, ends = engine.system, check_times(engine.system, times)
+    check_tolerance(relative_tolerance)
+    check_direct_noise(engine)
+    longest = LONGEST_SEGMENT if weighting_spacing is None else min(LONGEST_SEGMENT, weighting_spacing)
+    # an end time at the start needs no integration, only a segment to read it in
+    last = ends[-1] if ends[-1] > system.start else min(system.end, system.start + longest)
+    segments = flight_segments(system, np.append(ends[:-1], last), longest)
+    result = engine.run(executable, segments, relative_tolerance, transition=weighting_spacing is not None)
+    at = np.where(ends > system.start, np.searchsorted(segments.end, ends), -1)
+    found = result.covariance[at], result.mean[at], result.error[at]
+    if at[0] < 0:
+        for array, value in zip(found, _at_start(executable, segments), strict=True):
+            array[0] = value
+    weighting = None
+    if result.transition is not None:
+        weighting = _weighting_functions(executable, segments, at, result.transition)
+    return SweepResult(ends, *found, result.counters, weighting)
+
+
+def _at_start(
+    executable: ExecutableSystem, segments: Segments
+) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    """Return covariances, mean and their error before any noise has acted."""
+    system = executable.system
+    matrices = executable.matrices(segments.start, segments.low[0], segments.high[0])
+    covariances = [system.start_covariance_matrix(source, executable.parameters) for source in system.sources]
+    covariance = np.array([matrices["C"] @ P @ matrices["C"].T for P in covariances])
+    return covariance, (matrices["G"] @ matrices["inputs"])[:, 0], 0.0
+
+
+def with_sweep_mean_tables(
+    engine: CompiledSweep, executable: ExecutableSystem, relative_tolerance: float = 1e-9
+) -> ExecutableSystem:
+    """Return the system with its tables of the mean response filled in by the sweep's own forward mean."""
+
+    def mean(of: ExecutableSystem, times: NDArray[np.float64]) -> MeanResponse:
+        system = of.system
+        pieces = intervals(system, float(times[0]), float(times[-1]))
+        which = np.searchsorted([p.end for p in pieces], times[1:])
+        low, high = (np.array([getattr(p, side) for p in pieces])[which] for side in ("low", "high"))
+        segments = Segments(float(times[0]), np.ascontiguousarray(times[1:]), low, high)
+        states, outputs, _ = engine.mean_history(of, segments, relative_tolerance)
+        first = of.functions.response(
+            times[0], pieces[0].low, pieces[0].high, of.parameters, of.address, np.zeros(states.shape[1])
+        )
+        return MeanResponse(
+            times,
+            np.concatenate([np.zeros((1, states.shape[1])), states]),
+            np.concatenate([np.array(first.full()).T, outputs]),
+        )
+
+    return with_mean_tables(executable, mean)
+
+
+def batch(
+    engine: CompiledSweep,
+    executable: ExecutableSystem,
+    parameter_sets: Sequence[NDArray[np.float64]] | NDArray[np.float64],
+    times: ArrayLike,
+    *,
+    relative_tolerance: float = 1e-4,
+    threads: int | None = None,
+) -> list[SweepResult]:
+    """Sweep many parameter sets, one after another on each of several threads.
+
+    Parameters
+    ----------
+    engine : CompiledSweep
+    executable : ExecutableSystem
+        Tables common to all sets; those of the mean response are computed anew for each set.
+    parameter_sets : (n, parameters) array or sequence
+    times, relative_tolerance
+        As for ``sweep``; the mean tables are made at a hundredth of the tolerance.
+    threads : int, optional
+        All cores by default.
+
+    Raises
+    ------
+    IntegrationError
+        If more threads are asked for than there are cores, or a set fails; the message says which.
+    """
+    cores = available_cores()
+    threads = cores if threads is None else threads
+    if not 1 <= threads <= cores:
+        raise IntegrationError(f"{threads} threads were asked for and there are {cores} cores; choose 1 to {cores}")
+
+    def one(number_and_set: tuple[int, NDArray[np.float64]]) -> SweepResult:
+        number, values = number_and_set
+        try:
+            member = executable.with_numbers(parameters=np.asarray(values, float))
+            member = with_sweep_mean_tables(engine, member, 1e-2 * relative_tolerance)
+            return sweep(engine, member, times, relative_tolerance=relative_tolerance)
+        except IntegrationError as error:
+            raise IntegrationError(f"parameter set {number}: {error}") from error
+
+    return _map(one, list(enumerate(parameter_sets)), threads)
+
+
+def _map(work: Callable, items: list, threads: int) -> list[SweepResult]:
+    with ThreadPoolExecutor(threads) as pool:
+        return list(pool.map(work, items))
+
+
+def available_cores() -> int:
+    """Return the number of processors that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def check_tolerance(relative_tolerance: float) -> None:
+    """Raise IntegrationError for a tolerance that cannot be met."""
+    if not LEAST_TOLERANCE <= relative_tolerance <= LARGEST_TOLERANCE:
+        raise IntegrationError(
+            f"a relative tolerance of {relative_tolerance:g} cannot be met; choose {LEAST_TOLERANCE:g} to "
+            f"{LARGEST_TOLERANCE:g}"
+        )
+
+
+def check_times(system: LinearSystem, times: ArrayLike) -> NDArray[np.float64]:
+    """Return end times as an array.
+
+    Raises
+    ------
+    TimeRangeError
+        If there is none, or one is off the flight, not finite, or not after the one before.
+    """
+    ends = np.atleast_1d(np.asarray(times, dtype=float))
+    if ends.ndim != 1 or ends.size == 0:
+        raise TimeRangeError("the sweep needs at least one end time")
+    inside = (ends >= system.start) & (ends <= system.end)
+    if not inside.all():
+        raise TimeRangeError(
+            f"end time {ends[np.argmin(inside)]:g} s is off the flight of '{system.name}'; choose times from "
+            f"{system.start:g} s to {system.end:g} s"
+        )
+    if not (np.diff(ends) > 0).all():
+        raise TimeRangeError(f"end times must increase; look after {ends[np.argmin(np.diff(ends) > 0)]:g} s")
+    return ends
+
+
+def check_direct_noise(engine: CompiledSweep) -> None:
+    """Raise DirectNoiseError if white noise reaches a response directly."""
+    system, D = engine.system, engine.system.D.sparsity()
+    if D.nnz():
+        noise, output = system.noises[D.get_col()[0]], system.output_names[D.row()[0]]
+        raise DirectNoiseError(
+            f"white noise '{noise.name}' of source '{noise.source}' reaches '{output}' directly, whose variance is "
+            "then infinite; colour the noise"
+        )
+
+
+def flight_segments(system: LinearSystem, times: NDArray[np.float64], longest: float) -> Segments:
+    """Cut the flight at end times and discontinuities into segments no longer than ``longest`` seconds."""
+    ends, low, high = [], [], []
+    for interval in intervals(system, system.start, float(times[-1])):
+        inside = times[(times > interval.begin) & (times < interval.end)]
+        marks = np.concatenate([[interval.begin], inside, [interval.end]])
+        for a, b in pairwise(marks):
+            pieces = max(1, int(np.ceil((b - a) / longest - 1e-9)))
+            ends.append(np.append(np.linspace(a, b, pieces + 1)[1:-1], b))
+            low.append(np.full(pieces, interval.low))
+            high.append(np.full(pieces, interval.high))
+    return Segments(system.start, np.concatenate(ends), np.concatenate(low), np.concatenate(high))
+
+
+def _weighting_functions(
+    executable: ExecutableSystem, segments: Segments, at: NDArray[np.intp], transition: NDArray[np.float64]
+) -> WeightingFunctions:
+    """Run all adjoints backward over the segments; a column joins the block at its end time."""
+    system = executable.system
+    n, r, k, m = len(system.states), len(system.outputs), at.size, segments.end.size + 1
+    times = np.concatenate([[segments.start], segments.end])
+    noise = np.zeros((k, m, r, len(system.noises)))
+    inputs = np.zeros((k, m, r, len(system.input_names)))
+    rows = np.zeros((k, r, n))
+    joins = {int(segment): end for end, segment in enumerate(at)}
+    first = k
+    for point in range(m - 1, -1, -1):
+        segment = max(point - 1, 0)  # a point belongs to the segment that it ends: the left side of a jump
+        matrices = executable.matrices(float(times[point]), segments.low[segment], segments.high[segment])
+        if point < m - 1:
+            rows[first:] = rows[first:] @ transition[point]
+        if point - 1 in joins:
+            first = joins[point - 1]
+            rows[first] = matrices["C"]
+        noise[first:, point] = rows[first:] @ matrices["B"]
+        inputs[first:, point] = rows[first:] @ matrices["E"]
+    return WeightingFunctions(times, noise, inputs)
