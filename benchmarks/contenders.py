@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.util import find_spec
 
 import casadi as ca
@@ -84,10 +84,10 @@ class Adjoint:
 def contenders(study: Study) -> tuple[list[Contender], list[str]]:
     """Return the methods, and a line for each that is missing."""
     found, missing = [], []
-    for method in ("adams", "bdf"):
+    for method, label in (("adams", "Adams"), ("bdf", "BDF")):
         for tolerance in (1e-5, 1e-7, 1e-9):
             options = IntegratorOptions(method=method, relative_tolerance=tolerance)
-            found.append(Contender(f"CVODES {method}", f"{tolerance:g}", _engine(study, "cvodes", options), True))
+            found.append(Contender(f"CVODES {label}", f"{tolerance:g}", _engine(study, "cvodes", options), True))
     for step in (0.02, 0.01, 0.005):
         found.append(Contender("CasADi rk, compiled rhs", f"{1e3 * step:g} ms", _casadi_rk(study, step), True))
     for tolerance in (1e-5, 1e-8):
@@ -118,8 +118,6 @@ def contenders(study: Study) -> tuple[list[Contender], list[str]]:
         Contender("ensemble of 500, compiled", "50 ms", _engine(study, "ensemble", EnsembleOptions(runs=500)), False)
     )
     if "sweep" in ENGINES:
-        from dataclasses import replace
-
         for tolerance in (1e-4, 1e-6, 1e-8):
             options = replace(ENGINES["sweep"].options(), relative_tolerance=tolerance)
             found.append(Contender("sweep", f"{tolerance:g}", _engine(study, "sweep", options), False))

@@ -26,6 +26,7 @@ from contenders import Contender, contenders
 from growth import Rows, growth
 from matplotlib import rc_context
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter, ScalarFormatter
 
 FULL = np.arange(11.0, 141.0)
 SOME = np.array([20.0, 60.0, 100.0, 140.0])
@@ -80,6 +81,7 @@ def error_figure(results: list[tuple[Contender, float, float, float]]) -> Figure
             xlabel="run time for 130 end times, 3 responses, 3 sources (s)", ylabel="largest relative error of a σ",
             title="AS-504: error against run time, one run",
         )  # fmt: skip
+        axes.xaxis.set_minor_formatter(NullFormatter())
         axes.legend(fontsize=8.5, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return figure
 
@@ -91,7 +93,9 @@ def growth_figure(found: dict[str, Rows]) -> Figure:
             for k, (name, values) in enumerate(rows):
                 points = [(count, seconds) for count, seconds in values if seconds is not None]
                 axes.loglog(*zip(*points, strict=True), marker="osD^"[k % 4], label=name)
-            axes.set(xlabel=title, ylabel="run time (s)")
+            axes.set(xlabel=title, ylabel="run time (s)", xticks=[count for count, _ in rows[0][1]])
+            axes.xaxis.set_major_formatter(ScalarFormatter())
+            axes.xaxis.set_minor_formatter(NullFormatter())
             axes.legend(fontsize=8.5)
         figure.suptitle("Run time against size")
     return figure

@@ -92,9 +92,10 @@ def discretise(executable: ExecutableSystem, times: Sequence[float], substep: fl
     substeps = _substeps(rates, [interval for _, interval in pieces], scale, columns, substep)
     transition = np.tile(np.eye(n), (len(times), 1, 1))
     added, forced = np.zeros((len(times), s, n, n)), np.zeros((len(times), n))
-    for (number, _), part in zip(pieces, substeps, strict=True):
-        before = transition[number], added[number], forced[number]
-        transition[number], added[number], forced[number] = _compose(before, part)
+    with np.errstate(over="ignore", invalid="ignore"):  # growth beyond numbers is reported below, with its time
+        for (number, _), part in zip(pieces, substeps, strict=True):
+            before = transition[number], added[number], forced[number]
+            transition[number], added[number], forced[number] = _compose(before, part)
     C, mean, state = [], [], np.zeros(n)
     for time, Phi, Q, b in zip(times, transition, added, forced, strict=True):
         if not (np.isfinite(Phi).all() and np.isfinite(Q).all()):

@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 from matplotlib import rc_context
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
 
 from .output import write_whole
 from .statistics import COMBINED, ResponseStatistics
@@ -147,6 +148,7 @@ def tolerance_figure(measurements: Sequence[Measurement], paces: Sequence[Pace],
         seconds.set(xlabel="relative tolerance", ylabel="run time (ms)")
         for axes in (error, seconds):
             axes.invert_xaxis()
+        seconds.yaxis.set_minor_formatter(NullFormatter())
         error.legend(fontsize=8.5)
         edges = [paces[0].begin, *(p.end for p in paces)]
         for values, label, color in (

@@ -123,7 +123,7 @@ def coverage(study: Study, times, std, mean, seeds) -> float:
     for seed in seeds:
         options = EnsembleOptions(runs=20_000, seed=seed, confidence=0.99)
         found = study.response_statistics(times, engine="ensemble", options=options)
-        slack = 1e-9 * np.abs(mean)  # a source that does not reach a response has an interval of no length
+        slack = 1e-6 * np.abs(mean)  # a source that does not reach a response has an interval of no length
         inside.append((found["std_low"].values <= std) & (std <= found["std_high"].values))
         inside.append((found["mean_low"].values - slack <= mean) & (mean <= found["mean_high"].values + slack))
     return float(np.mean(inside))

@@ -49,11 +49,10 @@ def test_the_fastest_root_and_its_state_are_named(study):
 
 
 def test_functional_iteration_follows_the_fastest_root_and_newton_does_not():
-    """Six times the root: functional iteration takes steps a few times shorter, Newton about the same."""
+    """Six times the root: functional iteration takes steps a few times shorter, Newton steps over its limit."""
     slow, fast = (pacing(Study.from_system(system(w)), 10.0, windows=2)[0] for w in (60.0, 360.0))
     assert slow.functional_step / fast.functional_step > 3
-    assert slow.newton_step / fast.newton_step < 1.5
-    assert fast.functional_step < fast.functional_limit
+    assert fast.functional_step < fast.functional_limit < fast.newton_step / 1.5
 
 
 def test_where_the_fast_root_has_died_out_the_oscillator_paces(study):
