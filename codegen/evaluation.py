@@ -27,10 +27,10 @@ class MatrixEvaluator:
         parameters = np.ascontiguousarray(executable.parameters, dtype=float)
         self._arguments = (self._time, self._low, self._high, parameters, np.array([executable.address]))
         for i, argument in enumerate(self._arguments):
-            self._buffer.set_arg(i, argument.data)  # type: ignore[call-arg]
+            self._buffer.set_arg(i, argument.data)  # pyright: ignore[reportCallIssue]
         self._nonzeros = [np.zeros(max(1, function.nnz_out(i))) for i in range(len(MATRICES))]
         for i, nonzeros in enumerate(self._nonzeros):
-            self._buffer.set_res(i, nonzeros.data)  # type: ignore[call-arg]
+            self._buffer.set_res(i, nonzeros.data)  # pyright: ignore[reportCallIssue]
         self._wanted = []
         for name in names:
             i = MATRICES.index(name)

@@ -5,3 +5,4 @@ from .ensemble import EnsembleOptions as EnsembleOptions
 from .integration import IntegratorOptions as IntegratorOptions
 from .statistics import ResponseStatistics as ResponseStatistics
 from .study import Study as Study
+from .sweep_engine import SweepOptions as SweepOptions

@@ -97,7 +97,7 @@ class AdjointSolver:
         return AdjointRun(time, variance, mean, adjoint, counters.totals)
 
     def steps(self, adjoint: NDArray[np.float64], time: float, earliest: float) -> int:
-        """Return the number of steps from ``time`` back to ``earliest``, adjoints (responses, n) given at ``time``."""
+        """Return the number of steps from ``time`` to ``earliest`` (s), with adjoints (responses, n) at ``time``."""
         scaled = (adjoint * self._state_scale).T / self._output_scale
         return self._backward(scaled, time, earliest)[2].totals["nsteps"]
 

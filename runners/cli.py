@@ -33,19 +33,22 @@ def run(
     vehicle: VehicleArgument,
     times: Annotated[str | None, typer.Option(help="End times in s: START:STOP:STEP or T1,T2,...")] = None,
     out: Annotated[Path | None, typer.Option(help="Folder for results; VEHICLE-results without it.")] = None,
-    method: Annotated[str, typer.Option(help="CVODES formulas: adams or bdf.")] = "adams",
-    tolerance: Annotated[float, typer.Option(help="Relative tolerance of the integration.")] = 1e-7,
+    engine: Annotated[
+        str | None, typer.Option(help="sweep, cvodes, covariance or ensemble; the sweep where a compiler is found.")
+    ] = None,
+    method: Annotated[str | None, typer.Option(help="CVODES formulas, adams or bdf; chooses cvodes.")] = None,
+    tolerance: Annotated[float | None, typer.Option(help="Relative tolerance of the integration.")] = None,
 ) -> None:
     """Mean, variance and mean + 3 sigma of all responses over flight time: tables and figures."""
+    from .engines import engine_options
     from .figures import response_figure, weighting_figure, words, write_figure
-    from .integration import IntegratorOptions
     from .output import prepare_folder, write_statistics
     from .study import Study
     from .times import parse_times
 
     folder = out or Path(f"{Path(vehicle).name}-results")
     prepare_folder(folder)
-    options = IntegratorOptions(method=method, relative_tolerance=tolerance)  # type: ignore[arg-type]
+    engine, options = engine_options(engine, method=method, relative_tolerance=tolerance)
     with console.status("loading and preparing code"):
         study = Study.load(vehicle)
     assert study.vehicle is not None
@@ -55,6 +58,7 @@ def run(
         task = progress.add_task("end times", total=len(end_times))
         statistics = study.response_statistics(
             end_times,
+            engine=engine,
             options=options,
             progress=lambda t: progress.update(task, advance=1, description=f"end time {t:g} s"),
         )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,7 +13,8 @@ from .adjoint import AdjointSolver
 from .covariance import CovarianceOptions, covariance_equation
 from .ensemble import EnsembleOptions, ensemble_dataset
 from .integration import IntegratorOptions
-from .statistics import ResponseStatistics, provenance, response_dataset, statistics_dataset
+from .statistics import COMBINED, ResponseStatistics, provenance, response_dataset, statistics_dataset
+from .sweep_engine import SweepOptions, SweepResult, sweep, sweep_of
 
 if TYPE_CHECKING:
     from .study import Study
@@ -58,11 +59,39 @@ def find_engine(name: str) -> Engine:
     return ENGINES[name]
 
 
+def engine_options(name: str | None, **settings: object) -> tuple[str | None, object | None]:
+    """Return an engine and its options from what a person named; None leaves the choice to the study.
+
+    ``method`` alone means CVODES, and ``relative_tolerance`` alone the sweep.
+
+    Raises
+    ------
+    UnknownNameError, IntegrationError
+    """
+    given = {key: value for key, value in settings.items() if value is not None}
+    if name is None and given:
+        name = "cvodes" if "method" in given else "sweep"
+    if name is None:
+        return None, None
+    takes = {field.name for field in fields(find_engine(name).options)}
+    for key in given:
+        if key not in takes:
+            raise IntegrationError(f"engine '{name}' takes no {key.replace('_', ' ')}; it takes {', '.join(takes)}")
+    return name, find_engine(name).options(**given)
+
+
+def default_engine(study: Study, options: object | None) -> str:
+    """Return the engine that options belong to; without any the sweep, or CVODES where nothing is compiled."""
+    if options is not None:
+        return next((name for name, e in ENGINES.items() if isinstance(options, e.options)), "sweep")
+    return "cvodes" if study.executable.library is None else "sweep"
+
+
 def compute_statistics(
     study: Study,
     times: list[float],
     responses: list[str],
-    engine: str,
+    engine: str | None,
     options: object | None,
     check: bool,
     progress: Progress | None,
@@ -73,6 +102,8 @@ def compute_statistics(
     ------
     UnknownNameError, IntegrationError
     """
+    if engine is None:
+        engine = default_engine(study, options)
     chosen = find_engine(engine)
     settings = chosen.options() if options is None else options
     if not isinstance(settings, chosen.options):
@@ -109,6 +140,57 @@ def _cvodes(
     return response_dataset(study, runs, responses, options)
 
 
+def _sweep(
+    study: Study, times: list[float], responses: list[str], options: SweepOptions, progress: Progress | None
+) -> ResponseStatistics:
+    engine = sweep_of(study.system)
+    found = sweep(engine, study.with_means, times, relative_tolerance=options.relative_tolerance, responses=responses)
+    if progress:
+        for time in times:
+            progress(time)
+    return sweep_dataset(study, found, responses, options)
+
+
+def sweep_dataset(study: Study, found: SweepResult, responses: list[str], options: SweepOptions) -> ResponseStatistics:
+    """Return the dataset of a sweep: statistics, covariances between responses, and the error estimate."""
+    rows = [study.system.output_index(name) for name in responses]
+    attributes = provenance(study) | {
+        "engine": "sweep",
+        "relative_tolerance": options.relative_tolerance,
+        **{f"sweep_{name}": value for name, value in found.counters.items()},
+    }
+    variance = found.variance[:, rows]
+    dataset = statistics_dataset(study, found.times.tolist(), responses, found.mean[:, rows], variance, attributes)
+    covariance = found.covariance[:, :, rows][:, :, :, rows]
+    covariance = np.concatenate([covariance, covariance.sum(axis=1, keepdims=True)], axis=1)
+    dataset["covariance"] = (
+        ("time", "source", "response", "other_response"),
+        covariance,
+        {"units": "product of the units of the two responses", "long_name": "covariance between responses"},
+    )
+    dataset = dataset.assign_coords(other_response=list(responses))
+    error = np.moveaxis(found.error_estimate[:, :, rows], 1, 2)
+    total = dataset["variance"].sel(source=COMBINED).values
+    shared = (variance * error).sum(axis=2) / np.where(total > 0, total, 1.0)
+    dataset["error_estimate"] = (
+        ("time", "response", "source"),
+        np.concatenate([error, shared[:, :, None]], axis=2),
+        {"units": "1", "long_name": "estimated relative error of the std"},
+    )
+    return dataset
+
+
+def batch_dataset(
+    study: Study, found: list[SweepResult], responses: list[str], options: SweepOptions
+) -> ResponseStatistics:
+    """Return the dataset of a batch: statistics with a dimension ``member`` in front."""
+    rows = [study.system.output_index(name) for name in responses]
+    attributes = provenance(study) | {"engine": "sweep", "relative_tolerance": options.relative_tolerance}
+    mean = np.array([member.mean[:, rows] for member in found])
+    variance = np.array([member.variance[:, rows] for member in found])
+    return statistics_dataset(study, found[0].times.tolist(), responses, mean, variance, attributes)
+
+
 def _covariance(
     study: Study, times: list[float], responses: list[str], options: CovarianceOptions, progress: Progress | None
 ) -> ResponseStatistics:
@@ -132,6 +214,7 @@ def _tenth(options: Any) -> Any:
 
 
 ENGINES = {
+    "sweep": Engine("sweep", SweepOptions, _sweep, _tenth, SweepOptions(relative_tolerance=1e-9)),
     "cvodes": Engine(
         "adjoint (CVODES)", IntegratorOptions, _cvodes, _tenth, IntegratorOptions(relative_tolerance=1e-9)
     ),

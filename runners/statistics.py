@@ -17,6 +17,7 @@ from .integration import COUNTERS, IntegratorOptions
 
 if TYPE_CHECKING:
     from .study import Study
+    from .sweep_engine import SweepResult
 
 COMBINED = "combined"
 
@@ -71,16 +72,16 @@ def statistics_dataset(
 
     Parameters
     ----------
-    mean : (k, responses) array
-    variance : (k, responses, sources) array
+    mean : (k, responses) or (members, k, responses) array
+    variance : (k, responses, sources) or (members, k, responses, sources) array
         The combined variance is added here.
     """
     system = study.system
-    variance = np.concatenate([variance, variance.sum(axis=2, keepdims=True)], axis=2)
+    variance = np.concatenate([variance, variance.sum(axis=-1, keepdims=True)], axis=-1)
     std = np.sqrt(variance)
-    mean = np.broadcast_to(mean[:, :, None], variance.shape).copy()
+    mean = np.broadcast_to(mean[..., None], variance.shape).copy()
     units = [system.outputs[system.output_index(name)].unit for name in responses]
-    dims = ("time", "response", "source")
+    dims = ("member", "time", "response", "source")[-variance.ndim :]
     dataset = ResponseStatistics(
         {
             "mean": (dims, mean),
@@ -138,6 +139,29 @@ def weighting_dataset(study: Study, time: float, history: AdjointHistory) -> xr.
             "input": list(system.input_names),
         },
         provenance(study) | {"t2_s": time},
+    )
+
+
+def weighting_family(study: Study, found: SweepResult) -> xr.Dataset:
+    """Return the weighting functions of all end times of a sweep as a dataset."""
+    system, weighting = study.system, found.weighting
+    assert weighting is not None
+    dims = {
+        "noise_weighting": ("time", "response", "noise", "t"),
+        "input_weighting": ("time", "response", "input", "t"),
+    }
+    values = {"noise_weighting": weighting.noise, "input_weighting": weighting.inputs}
+    return xr.Dataset(
+        {name: (dims[name], np.moveaxis(values[name], 1, -1)) for name in dims},
+        {
+            "time": ("time", found.times, {"units": "s", "long_name": "flight time t2"}),
+            "t": ("t", weighting.times, {"units": "s", "long_name": "time of the impulse"}),
+            "response": list(system.output_names),
+            "noise": list(system.noise_names),
+            "source": ("noise", [n.source for n in system.noises]),
+            "input": list(system.input_names),
+        },
+        provenance(study),
     )
 
 

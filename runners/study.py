@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -19,11 +19,12 @@ from ..model.system import LinearSystem, Parameter
 from ..model.tables import table_values
 from ..model.vehicle import Vehicle, load_vehicle
 from .adjoint import AdjointSolver
-from .engines import Progress, compute_statistics
+from .engines import Progress, batch_dataset, compute_statistics
 from .integration import IntegratorOptions
 from .mean_response import with_mean_tables
 from .stability import Root, check_coupling, matrices_at, roots, warn_if_unstable
-from .statistics import ResponseStatistics, weighting_dataset
+from .statistics import ResponseStatistics, weighting_dataset, weighting_family
+from .sweep_engine import SweepOptions, batch, sweep, sweep_of, with_sweep_mean_tables
 from .wind_start import covariance_at
 
 POSITIVE = ("correlation_time", "reference_area")
@@ -97,6 +98,9 @@ class Study:
         ParameterValueError
             For a value that is not finite, or a time or area that is not positive.
         """
+        return Study(self.executable.with_numbers(parameters=self._parameter_values(changes)), self.vehicle)
+
+    def _parameter_values(self, changes: Mapping[str, float]) -> NDArray[np.float64]:
         names, values = self.system.parameter_names, self.executable.parameters.copy()
         for name, value in changes.items():
             if name not in names:
@@ -104,12 +108,14 @@ class Study:
             if not np.isfinite(value) or (name.rpartition(".")[2] in POSITIVE and value <= 0):
                 raise ParameterValueError(f"parameter '{name}' cannot be {value:g}; give a finite, sensible number")
             values[names.index(name)] = float(value)
-        return Study(self.executable.with_numbers(parameters=values), self.vehicle)
+        return values
 
     @cached_property
     def with_means(self) -> ExecutableSystem:
         """The system with its tables of the mean response, which the noise coefficients need, filled in."""
-        return with_mean_tables(self.executable)
+        if self.executable.library is None:
+            return with_mean_tables(self.executable)
+        return with_sweep_mean_tables(sweep_of(self.system), self.executable)
 
     def matrices(self, time: float) -> tuple[NDArray, NDArray, NDArray, NDArray]:
         """Return A (n, n), B (n, n_w), C (n_y, n), D (n_y, n_w) at a time; names are in ``study.system``."""
@@ -132,7 +138,7 @@ class Study:
         times: Iterable[float],
         *,
         responses: Iterable[str] | None = None,
-        engine: str = "cvodes",
+        engine: str | None = None,
         options: object | None = None,
         check: bool = False,
         progress: Progress | None = None,
@@ -146,11 +152,12 @@ class Study:
         responses : iterable of str, optional
             All without it. White noise that reaches a response directly makes its variance infinite; leave that
             response out or colour the noise.
-        engine : str
-            'cvodes': one backward adjoint run an end time. 'covariance': the covariance equation, forward.
-            'ensemble': simulated flights, with confidence intervals.
-        options : IntegratorOptions, CovarianceOptions or EnsembleOptions, optional
-            As the engine takes.
+        engine : str, optional
+            'sweep' (default where a compiler is found): all end times in one pass of a generated integrator.
+            'cvodes' (default elsewhere): one backward adjoint run an end time. 'covariance': the covariance
+            equation, forward. 'ensemble': simulated flights, with confidence intervals.
+        options : SweepOptions, IntegratorOptions, CovarianceOptions or EnsembleOptions, optional
+            As the engine takes; alone they choose it.
         check : bool
             Compute everything a second time with a finer discretisation (tolerance, or substep of the ensemble) and
             keep the relative difference of the standard deviation as ``discretisation_difference``.
@@ -176,6 +183,83 @@ class Study:
         warn_if_unstable(self.executable, times[-1])
         return compute_statistics(self, times, wanted, engine, options, check, progress)
 
+    def batch(
+        self,
+        parameter_sets: Sequence[Mapping[str, float]],
+        times: Iterable[float],
+        *,
+        options: SweepOptions | None = None,
+        threads: int | None = None,
+    ) -> ResponseStatistics:
+        """Return the statistics for many sets of parameter values by the sweep, on all cores.
+
+        Parameters
+        ----------
+        parameter_sets : sequence of mappings
+            Each as for :meth:`with_parameters`.
+        times : iterable of float
+            End times t2, s.
+        options : SweepOptions, optional
+            Relative tolerance 1e-4 without it.
+        threads : int, optional
+            All cores without it.
+
+        Returns
+        -------
+        ResponseStatistics
+            As :meth:`response_statistics`, with a dimension ``member`` in front.
+
+        Raises
+        ------
+        TimeRangeError, UnknownNameError, ParameterValueError, IntegrationError, NoCompilerError
+        """
+        if not parameter_sets:
+            raise ParameterValueError("a batch needs at least one set of parameter values")
+        ends = sorted({float(t) for t in times})
+        self._check_times(ends)
+        options = options or SweepOptions(relative_tolerance=1e-4)
+        values = [self._parameter_values(changes) for changes in parameter_sets]
+        found = batch(
+            sweep_of(self.system),
+            self.executable,
+            values,
+            ends,
+            relative_tolerance=options.relative_tolerance,
+            threads=threads,
+        )
+        return batch_dataset(self, found, self._responses(None), options)
+
+    def weighting_functions(
+        self, times: Iterable[float], *, spacing: float = 0.25, options: SweepOptions | None = None
+    ) -> xr.Dataset:
+        """Return the weighting functions g(t2, t) of all responses for many end times, by one backward sweep.
+
+        Parameters
+        ----------
+        times : iterable of float
+            End times t2, s.
+        spacing : float
+            Largest distance between points, s.
+
+        Returns
+        -------
+        xarray.Dataset
+            As :meth:`weighting_function`, with a dimension ``time`` in front; zero for t after the end time.
+        """
+        ends = sorted({float(t) for t in times})
+        self._check_times(ends)
+        self._check_spacing(spacing)
+        tolerance = (options or SweepOptions()).relative_tolerance
+        found = sweep(
+            sweep_of(self.system),
+            self.with_means,
+            ends,
+            relative_tolerance=tolerance,
+            weighting_spacing=spacing,
+            responses=(),
+        )
+        return weighting_family(self, found)
+
     def weighting_function(
         self, time: float, *, spacing: float = 0.05, options: IntegratorOptions | None = None
     ) -> xr.Dataset:
@@ -196,10 +280,13 @@ class Study:
             the wind straight into the vehicle; its delta at t = t2 has the weight ``direct`` (response, input).
         """
         self._check_times([time])
-        if not spacing > 0:
-            raise TimeRangeError(f"a spacing of {spacing:g} s is not positive")
+        self._check_spacing(spacing)
         history = AdjointSolver(self.with_means, options or IntegratorOptions()).history(float(time), spacing)
         return weighting_dataset(self, float(time), history)
+
+    def _check_spacing(self, spacing: float) -> None:
+        if not spacing > 0:
+            raise TimeRangeError(f"a spacing of {spacing:g} s is not positive")
 
     def _check_times(self, times: list[float]) -> None:
         if not times:

@@ -6,13 +6,14 @@ import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..codegen.compiled import ExecutableSystem
-from ..codegen.sweep import CompiledSweep, Segments
+from ..codegen.sweep import CompiledSweep, Segments, compiled_sweep
 from ..model.errors import DirectNoiseError, IntegrationError, TimeRangeError
 from ..model.system import LinearSystem
 from .integration import intervals
@@ -20,6 +21,37 @@ from .mean_response import MeanResponse, with_mean_tables
 
 LONGEST_SEGMENT = 1.0  # s; weights of the error control are renewed and the Gramians stay well scaled
 LEAST_TOLERANCE, LARGEST_TOLERANCE = 1e-12, 1e-2
+
+
+@dataclass(frozen=True)
+class SweepOptions:
+    """How the sweep integrates.
+
+    Parameters
+    ----------
+    relative_tolerance : float
+        Of every standard deviation, between 1e-12 and 1e-2.
+    """
+
+    relative_tolerance: float = 1e-7
+
+    def __post_init__(self):
+        if not LEAST_TOLERANCE <= self.relative_tolerance <= LARGEST_TOLERANCE:
+            raise IntegrationError(
+                f"a relative tolerance of {self.relative_tolerance:g} cannot be met; choose {LEAST_TOLERANCE:g} to "
+                f"{LARGEST_TOLERANCE:g}"
+            )
+
+
+@lru_cache(maxsize=16)
+def sweep_of(system: LinearSystem) -> CompiledSweep:
+    """Return the compiled sweep of a system, the same one for every study of it.
+
+    Raises
+    ------
+    NoCompilerError, CompilerError, CacheError
+    """
+    return compiled_sweep(system)
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +111,7 @@ def sweep(
     *,
     relative_tolerance: float = 1e-6,
     weighting_spacing: float | None = None,
+    responses: Sequence[str] | None = None,
 ) -> SweepResult:
     """Sweep once over the flight for all end times.
 
@@ -93,14 +126,16 @@ def sweep(
         Of every standard deviation, between 1e-12 and 1e-2.
     weighting_spacing : float, optional
         Keep the weighting functions at points at most this many seconds apart.
+    responses : sequence of str, optional
+        Those wanted; all are computed, and only these are refused where white noise reaches them directly.
 
     Raises
     ------
     TimeRangeError, DirectNoiseError, IntegrationError, DataError
     """
     system, ends = engine.system, check_times(engine.system, times)
-    check_tolerance(relative_tolerance)
-    check_direct_noise(engine)
+    SweepOptions(relative_tolerance)
+    check_direct_noise(engine, engine.system.output_names if responses is None else responses)
     longest = LONGEST_SEGMENT if weighting_spacing is None else min(LONGEST_SEGMENT, weighting_spacing)
     # an end time at the start needs no integration, only a segment to read it in
     last = ends[-1] if ends[-1] > system.start else min(system.end, system.start + longest)
@@ -206,15 +241,6 @@ def available_cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def check_tolerance(relative_tolerance: float) -> None:
-    """Raise IntegrationError for a tolerance that cannot be met."""
-    if not LEAST_TOLERANCE <= relative_tolerance <= LARGEST_TOLERANCE:
-        raise IntegrationError(
-            f"a relative tolerance of {relative_tolerance:g} cannot be met; choose {LEAST_TOLERANCE:g} to "
-            f"{LARGEST_TOLERANCE:g}"
-        )
-
-
 def check_times(system: LinearSystem, times: ArrayLike) -> NDArray[np.float64]:
     """Return end times as an array.
 
@@ -237,15 +263,17 @@ def check_times(system: LinearSystem, times: ArrayLike) -> NDArray[np.float64]:
     return ends
 
 
-def check_direct_noise(engine: CompiledSweep) -> None:
-    """Raise DirectNoiseError if white noise reaches a response directly."""
+def check_direct_noise(engine: CompiledSweep, responses: Sequence[str]) -> None:
+    """Raise DirectNoiseError if white noise reaches one of the responses directly."""
     system, D = engine.system, engine.system.D.sparsity()
-    if D.nnz():
-        noise, output = system.noises[D.get_col()[0]], system.output_names[D.row()[0]]
-        raise DirectNoiseError(
-            f"white noise '{noise.name}' of source '{noise.source}' reaches '{output}' directly, whose variance is "
-            "then infinite; colour the noise"
-        )
+    for row, column in zip(D.row(), D.get_col(), strict=True):
+        if system.output_names[row] in responses:
+            noise = system.noises[column]
+            raise DirectNoiseError(
+                f"white noise of source '{noise.source}' reaches '{system.output_names[row]}' directly, so that its "
+                "variance is infinite; colour the noise (white = false with a correlation time) or leave the response "
+                "out"
+            )
 
 
 def flight_segments(system: LinearSystem, times: NDArray[np.float64], longest: float) -> Segments:

@@ -79,7 +79,7 @@ def test_results_are_labelled(as504, tmp_path):
     np.testing.assert_allclose(
         stats.variance.sel(source="combined"), stats.variance.isel(source=slice(3)).sum("source"), rtol=1e-12
     )
-    for attribute in ("data_sha256", "ascentwind", "casadi", "method", "relative_tolerance", "structure"):
+    for attribute in ("data_sha256", "ascentwind", "casadi", "engine", "relative_tolerance", "structure"):
         assert attribute in stats.attrs
     stats.to_netcdf(tmp_path / "s.nc", engine="scipy")
     with xr.open_dataset(tmp_path / "s.nc", engine="scipy") as again:
