@@ -12,7 +12,7 @@ from scipy.linalg import expm
 from ..model.wind_filter import ShapingFilter
 
 KNOT_SPACING = 1000.0  # m, least distance of the knots of a coefficient
-SAMPLE_SPACING = 125.0  # m, at most, of the samples of a fitted filter
+SAMPLE_SPACING = 62.5  # m, at most, of the samples of a fitted filter
 GAUSS = 0.5 / np.sqrt(3.0)
 
 Matrices = Callable[[float], tuple[NDArray, NDArray]]

@@ -46,8 +46,8 @@ class FitOptions:
     """
 
     time_limit: float = 60.0
-    max_evaluations: int = 400
-    tolerance: float = 1e-5
+    max_evaluations: int = 1000
+    tolerance: float = 1e-4
     seed: int = 504
     progress: Progress | None = None
 

@@ -23,7 +23,7 @@ from .synthesis_result import SynthesisResult
 
 METHOD = "constrained-response"
 FIT_STEP = 0.5  # km
-START_FLOOR = 0.05  # km, of each state's start variance: what unit noise brings over so much altitude
+START_FLOOR = 0.25  # km, of each state's start variance: what unit noise brings over so much altitude
 SMOOTHNESS, RIDGE = 0.3, 0.1  # m2/s2 a unit of second difference and of value: choose among equal fits
 # Integrals from each of two Gauss points to the end of a unit step, by the straight line through both
 TO_THE_END = tuple(
