@@ -9,6 +9,7 @@ import os
 import stat
 import tempfile
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,7 +18,7 @@ import platformdirs
 from filelock import FileLock, Timeout
 
 from ..model.errors import AscentwindError, AscentwindWarning
-from .compiler import FLAGS, Compiler, processor
+from .compiler import Compiler, processor
 
 log = logging.getLogger(__name__)
 
@@ -70,20 +71,28 @@ def cache_folder() -> Path:
     return folder
 
 
-def content_key(source: str, compiler: Compiler) -> str:
-    """Return the hash of everything that shapes a library."""
-    parts = (source, *compiler.command, compiler.version, *FLAGS, processor(), ca.CasadiMeta.version())
+def content_key(fingerprint: str, compiler: Compiler) -> str:
+    """Return the hash of everything that shapes a library.
+
+    ``fingerprint`` stands for the C source: it hashes all that the source is written from, and is quicker to have.
+    """
+    parts = (fingerprint, *compiler.command, compiler.version, *compiler.flags, processor(), ca.CasadiMeta.version())
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]
 
 
-def compiled_library(name: str, source: str, compiler: Compiler, structure: dict[str, str]) -> CompiledLibrary:
+def compiled_library(
+    name: str, fingerprint: str, source: Callable[[], str], compiler: Compiler, structure: dict[str, str]
+) -> CompiledLibrary:
     """Return the library of a C source, compiled now or before.
 
     Parameters
     ----------
     name : str
         Of the system; starts the file name.
-    source : str
+    fingerprint : str
+        Hash of what the source is written from.
+    source : callable
+        Writes the C source; called only when it has to be compiled.
     compiler : Compiler
     structure : dict
         Description of the system; when a library has to be made, the log says what changed since the last one.
@@ -93,7 +102,7 @@ def compiled_library(name: str, source: str, compiler: Compiler, structure: dict
     CacheError, CompilerError
     """
     folder = cache_folder()
-    key = content_key(source, compiler)
+    key = content_key(fingerprint, compiler)
     path = folder / f"{name}-{key}.so"
     if _intact(path):
         return CompiledLibrary(path, key, False)
@@ -108,7 +117,7 @@ def compiled_library(name: str, source: str, compiler: Compiler, structure: dict
                 )
                 path.replace(path.with_suffix(f".damaged-{os.getpid()}"))
             _report_change(folder / f"{name}.structure.json", structure, name)
-            _install(folder, path, source, compiler)
+            _install(folder, path, source(), compiler)
     except Timeout:
         raise CacheError(
             f"another process has held {folder / f'{name}-{key}.lock'} for {LOCK_SECONDS} s; remove it if none runs"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import warnings
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -14,11 +13,11 @@ from numpy.typing import NDArray
 
 from ..model.errors import AscentwindWarning
 from ..model.system import LinearSystem
-from ..model.tables import TableGroup, run_time_vector
+from ..model.tables import TableGroup, run_time_vector, table_values
 from .cache import CacheError, CompiledLibrary, compiled_library, set_aside
 from .compiler import find_compiler
 from .functions import MATRICES, CoreFunctions, SystemFunctions, core_functions, interpreted_functions
-from .source import c_source
+from .source import c_source, source_fingerprint
 
 log = logging.getLogger(__name__)
 
@@ -82,6 +81,16 @@ class ExecutableSystem:
         values = self.functions.matrices(time, low, high, self.parameters, self.address)
         return {name: np.array(value.full()) for name, value in zip(MATRICES, values, strict=True)}
 
+    def input_matrices(
+        self, times: NDArray[np.float64], low: float, high: float
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return B (k, n, n_w) and E (k, n, n_u) at many times."""
+        k, n = times.size, len(self.system.states)
+        fixed = (np.full(k, low), np.full(k, high), np.tile(self.parameters[:, None], k), np.full(k, self.address))
+        found = dict(zip(MATRICES, self.functions.matrices.map(k)(times, *fixed), strict=True))
+        B, E = (found[name].full().reshape(n, k, found[name].shape[1] // k).transpose(1, 0, 2) for name in ("B", "E"))
+        return B, E
+
     def with_numbers(
         self, *, groups: tuple[TableGroup, ...] | None = None, parameters: NDArray[np.float64] | None = None
     ) -> ExecutableSystem:
@@ -110,12 +119,15 @@ def executable_system(system: LinearSystem, compile: bool = True) -> ExecutableS
             _say_once("no C compiler was found (CC, cc, gcc, clang): CasADi's interpreter is used, a few times slower")
         return interpreted
     try:
-        library = compiled_library(system.name, c_source(system, core), compiler, dict(system.structure))
+        fingerprint = source_fingerprint(system, core)
+        library = compiled_library(
+            system.name, fingerprint, lambda: c_source(system, core), compiler, dict(system.structure)
+        )
     except CacheError as error:
         _say_once(f"compiled code is not used: {error}")
         return interpreted
     compiled = replace(interpreted, library=library)
-    difference = compare(compiled, interpreted)
+    difference = difference_from_core(compiled)
     if not difference <= AGREEMENT:
         set_aside(library)
         _say_once(
@@ -126,37 +138,40 @@ def executable_system(system: LinearSystem, compile: bool = True) -> ExecutableS
     return compiled
 
 
-def compare(one: ExecutableSystem, other: ExecutableSystem, points: int = 2, seed: int = 504) -> float:
-    """Return the largest difference between two forms of a system at random points, relative to each result."""
+def difference_from_core(executable: ExecutableSystem, points: int = 2, seed: int = 504) -> float:
+    """Return the largest difference between a system's functions and CasADi's interpreter at random points.
+
+    The interpreter evaluates the core functions on table values looked up by NumPy; a difference is relative to the
+    largest entry of its result.
+    """
     random = np.random.default_rng(seed)
-    system, largest = one.system, 0.0
-    end = system.end if np.isfinite(system.end) else system.start + 100.0
+    system, core, functions, p = executable.system, executable.core, executable.functions, executable.parameters
+    begin, end = system.start, system.end if np.isfinite(system.end) else system.start + 100.0
+    largest = 0.0
     for _ in range(points):
-        time = random.uniform(system.start, end)
-        pairs: list[tuple[Sequence, Sequence]] = []
-        pairs.append(
-            tuple(e.functions.matrices(time, system.start, end, e.parameters, e.address) for e in (one, other))
-        )
-        x = random.standard_normal(len(system.states))
-        pairs.append(
-            tuple([e.functions.response(time, system.start, end, e.parameters, e.address, x)] for e in (one, other))
-        )
-        for name in ("adjoint", "mean"):
-            x = random.standard_normal(getattr(one.functions, name).size1_in(1))
-            pairs.append(
-                tuple(
-                    getattr(e.functions, name)(0.0, x, [], e.integrator_parameters(time, 1.0, system.start, end), [])
-                    for e in (one, other)
-                )
-            )
-        for left, right in pairs:
-            for a, b in zip(left, right, strict=True):
-                a, b = np.array(ca.DM(a).full()), np.array(ca.DM(b).full())
-                if a.size:
-                    # a scale above zero: entries that vanish in exact arithmetic are compared absolutely
-                    scale = max(1e-300, float(np.abs(b).max()))
-                    largest = max(largest, float(np.abs(a - b).max()) / scale)
-    return largest if np.isfinite(largest) else float("inf")
+        time = random.uniform(begin, end)
+        v = np.array(list(table_values(executable.groups, time).values()))
+        x, adjoint = random.standard_normal(len(system.states)), random.standard_normal(core.adjoint.size1_in(3))
+        interval = executable.integrator_parameters(time, 1.0, begin, end)
+        at_time = (time, begin, end, p, executable.address)
+        backward, forward = functions.adjoint(0, adjoint, [], interval, []), functions.mean(0, x, [], interval, [])
+        pairs = [
+            *zip(
+                functions.matrices(*at_time),
+                [core.state_matrix(time, v, p), *core.other_matrices(time, v, p)],
+                strict=True,
+            ),
+            (functions.response(*at_time, x), core.response(time, v, p, x)),
+            (backward[0], -core.adjoint(time, v, p, adjoint)),
+            (backward[2], core.adjoint_quadrature(time, v, p, adjoint)),
+            (forward[0], core.mean(time, v, p, x)),
+        ]
+        for ours, reference in pairs:
+            a, b = ca.DM(ours).full(), ca.DM(reference).full()
+            if b.size:
+                difference = float(np.abs(a - b).max()) / max(1e-300, float(np.abs(b).max()))
+                largest = difference if not difference <= largest else largest
+    return largest
 
 
 def _say_once(text: str) -> None:

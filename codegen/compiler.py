@@ -13,7 +13,8 @@ from pathlib import Path
 
 from ..model.errors import AscentwindError
 
-FLAGS = ("-std=c99", "-O2", "-march=native", "-fPIC", "-shared")
+FLAGS = ("-std=c99", "-O2", "-fPIC", "-shared")
+NATIVE = "-march=native"
 
 
 class CompilerError(AscentwindError):
@@ -31,10 +32,11 @@ class CompilerError(AscentwindError):
 
 @dataclass(frozen=True)
 class Compiler:
-    """A C compiler and what it calls itself."""
+    """A C compiler: its command, what it calls itself, and the flags it is given."""
 
     command: tuple[str, ...]
     version: str
+    flags: tuple[str, ...] = FLAGS
 
     def compile(self, source: Path, library: Path) -> None:
         """Compile a C file into a shared library.
@@ -44,7 +46,7 @@ class Compiler:
         CompilerError
             With command and text.
         """
-        command = [*self.command, *FLAGS, "-o", str(library), str(source), "-lm"]
+        command = [*self.command, *self.flags, "-o", str(library), str(source), "-lm"]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         if done.returncode != 0 or not library.is_file():
             raise CompilerError(command, done.returncode, done.stderr + done.stdout)
@@ -63,7 +65,8 @@ def find_compiler() -> Compiler | None:
         return None
     for candidate in [shlex.split(named)] if named else [["cc"], ["gcc"], ["clang"]]:
         if shutil.which(candidate[0]):
-            return Compiler(tuple(candidate), _version(tuple(candidate)))
+            command = tuple(candidate)
+            return Compiler(command, _version(command), (*FLAGS, NATIVE) if _knows_native(command) else FLAGS)
         if named:
             raise CompilerError(candidate, 127, f"CC={named}: there is no such program")
     return None
@@ -73,6 +76,12 @@ def find_compiler() -> Compiler | None:
 def _version(command: tuple[str, ...]) -> str:
     done = subprocess.run([*command, "--version"], capture_output=True, text=True, check=False)
     return (done.stdout or done.stderr).partition("\n")[0].strip() or "unknown version"
+
+
+@lru_cache
+def _knows_native(command: tuple[str, ...]) -> bool:
+    check = [*command, NATIVE, "-E", "-x", "c", "-"]
+    return subprocess.run(check, input="", capture_output=True, text=True, check=False).returncode == 0
 
 
 @lru_cache

@@ -8,6 +8,10 @@ from collections.abc import Mapping, Sequence
 
 import casadi as ca
 
+_ELEMENTARY = (
+    *("sqrt", "exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "asinh", "acosh"),
+    *("atanh", "floor", "ceil", "fabs", "erf", "expm1", "log1p"),
+)
 _BINARY = {
     ca.OP_ADD: "{} + {}",
     ca.OP_SUB: "{} - {}",
@@ -37,12 +41,7 @@ _UNARY = {
     ca.OP_INV: "1.0 / {}",
     ca.OP_NOT: "!{}",
     ca.OP_SIGN: "(({0} > 0) - ({0} < 0))",
-    **{
-        getattr(ca, f"OP_{name.upper()}"): f"{name}({{}})"
-        for name in (
-            "sqrt exp log sin cos tan asin acos atan sinh cosh tanh asinh acosh atanh floor ceil fabs erf expm1 log1p"
-        ).split()
-    },
+    **{getattr(ca, f"OP_{name.upper()}"): f"{name}({{}})" for name in _ELEMENTARY},
 }
 
 

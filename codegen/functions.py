@@ -9,8 +9,8 @@ pseudo-time s from 0 to 1, so that one integrator serves every interval. Their p
 
     [origin, span, low, high, parameters, address of the tables]
 
-with flight time = origin - span s for the adjoint and origin + span s for the mean. Tables are looked up no
-further than [low, high], the interval between two discontinuities, so that no step sees the value beyond a jump.
+with flight time = origin - span s for the adjoint and origin + span s for the mean, kept within [low, high], the
+interval between two discontinuities, so that no step sees the value beyond a jump.
 The tables go by address because CasADi copies an integrator's parameters at every call.
 """
 
@@ -87,12 +87,12 @@ def core_functions(system: LinearSystem) -> CoreFunctions:
     adjoint, rate, quadrature = _adjoint(system)
     state, mean_rate = _mean(system)
     return CoreFunctions(
-        state_matrix=ca.Function("state_matrix_core", at, ca.cse([system.A])),
-        other_matrices=ca.Function("other_matrices_core", at, ca.cse(others)),
-        adjoint=ca.Function("adjoint_core", [*at, adjoint], ca.cse([rate])),
-        adjoint_quadrature=ca.Function("adjoint_quadrature_core", [*at, adjoint], ca.cse([quadrature])),
-        mean=ca.Function("mean_core", [*at, state], ca.cse([mean_rate])),
-        response=ca.Function("response_core", [*at, system.x], ca.cse([ca.densify(_without_noise(system, system.output))])),
+        state_matrix=ca.Function("state_matrix_core", at, [system.A]),
+        other_matrices=ca.Function("other_matrices_core", at, others),
+        adjoint=ca.Function("adjoint_core", [*at, adjoint], [rate]),
+        adjoint_quadrature=ca.Function("adjoint_quadrature_core", [*at, adjoint], [quadrature]),
+        mean=ca.Function("mean_core", [*at, state], [mean_rate]),
+        response=ca.Function("response_core", [*at, system.x], [ca.densify(_without_noise(system, system.output))]),
     )
 
 
@@ -131,17 +131,16 @@ def _without_noise(system: LinearSystem, expression: ca.SX) -> ca.SX:
     return ca.substitute(expression, ca.vertcat(system.w, system.u), signals)
 
 
-def interpreted_functions(
-    system: LinearSystem, core: CoreFunctions, groups: Sequence[TableGroup]
-) -> SystemFunctions:
+def interpreted_functions(system: LinearSystem, core: CoreFunctions, groups: Sequence[TableGroup]) -> SystemFunctions:
     """Return the functions for CasADi's interpreter, with the numbers of ``groups`` built in."""
     t, low, high, address = (ca.MX.sym(n) for n in ("t", "low", "high", "address"))
     p = ca.MX.sym("p", system.p.numel())
-    values = spline_lookup(groups, ca.fmin(ca.fmax(t, low), high))
+    time = ca.fmin(ca.fmax(t, low), high)
+    values = spline_lookup(groups, time)
     matrices = ca.Function(
         "matrices",
         [t, low, high, p, address],
-        core.state_matrix.call([t, values, p]) + core.other_matrices.call([t, values, p]),
+        core.state_matrix.call([time, values, p]) + core.other_matrices.call([time, values, p]),
         ["t", "low", "high", "p", "address"],
         list(MATRICES),
     )
@@ -151,7 +150,7 @@ def interpreted_functions(
     response = ca.Function(
         "response",
         [t, low, high, p, address, x],
-        [core.response(t, values, p, x)],
+        [core.response(time, values, p, x)],
         ["t", "low", "high", "p", "address", "x"],
         ["y"],
     )
@@ -168,8 +167,8 @@ def _integrand(
 ) -> ca.Function:
     s, x = ca.MX.sym("t"), ca.MX.sym("x", core.size1_in(3))
     p, z, u = ca.MX.sym("p", INTERVAL + parameters + 1), ca.MX.sym("z", 0), ca.MX.sym("u", 0)
-    time = p[0] + sign * p[1] * s
-    values = spline_lookup(groups, ca.fmin(ca.fmax(time, p[2]), p[3]))
+    time = ca.fmin(ca.fmax(p[0] + sign * p[1] * s, p[2]), p[3])
+    values = spline_lookup(groups, time)
     arguments = [time, values, p[INTERVAL : INTERVAL + parameters], x]
     integrand = p[1] * quadrature(*arguments) if quadrature else ca.MX(0, 1)
     outputs = [sign * p[1] * core(*arguments), ca.MX(0, 1), integrand, ca.MX(0, 1)]

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
+from dataclasses import fields
+from pathlib import Path
 from typing import Any
 
 import casadi as ca
@@ -25,10 +28,7 @@ class _Patterns:
 
     def add(self, sparsity: ca.Sparsity) -> str:
         rows, columns = sparsity.shape
-        if sparsity.is_dense():
-            values = [rows, columns, 1]
-        else:
-            values = [rows, columns, *sparsity.colind(), *sparsity.row()]
+        values = [rows, columns, 1] if sparsity.is_dense() else [rows, columns, *sparsity.colind(), *sparsity.row()]
         for label, known in self.labels.items():
             if known == values:
                 return label
@@ -128,6 +128,23 @@ def c_source(system: LinearSystem, core: CoreFunctions) -> str:
         integrands=integrands,
         exported=exported,
     )
+
+
+def source_fingerprint(system: LinearSystem, core: CoreFunctions) -> str:
+    """Return a hash of all that ``c_source`` writes from: the arithmetic, the names, and this code itself."""
+    here = Path(__file__).parent
+    digest = hashlib.sha256()
+    for field in fields(core):
+        digest.update(getattr(core, field.name).serialize().encode())
+    for part in (system.name, system.structure, system.states, system.noises, system.outputs):
+        digest.update(repr(part).encode())
+    for p in system.parameters:
+        digest.update(repr((p.name, p.unit)).encode())
+    for g in system.tables:
+        digest.update(repr((g.name, g.argument, g.names, g.units, g.knots.size)).encode())
+    for file in ("source.py", "expressions.py", "templates/system.c.jinja"):
+        digest.update((here / file).read_bytes())
+    return digest.hexdigest()
 
 
 def _integrand_interface(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import casadi as ca
 import numpy as np
@@ -62,7 +63,7 @@ def mean_knots(start: float, end: float, discontinuities: Sequence[float]) -> np
     edges = [start, *discontinuities, end]
     pieces = [
         np.linspace(low, high, max(4, int(np.ceil((high - low) / MEAN_SPACING))) + 1)[:-1]
-        for low, high in zip(edges[:-1], edges[1:], strict=True)
+        for low, high in pairwise(edges)
     ]
     return np.append(np.concatenate(pieces), end)
 
@@ -118,9 +119,7 @@ def assemble(vehicle: Vehicle, wind_start_covariance: np.ndarray) -> LinearSyste
     measured_rate = attitude_rate + sensor_slopes.T @ eta_rate
     T1 = transfer_function("T1", *networks["T1"], measured)
     T2 = transfer_function("T2", *networks["T2"], measured_rate)
-    gains = vehicle.tables
-    attitude_factor = tables["control.attitude_gain"] / float(gains["control.attitude_gain"].values[0])
-    rate_factor = tables["control.rate_gain"] / float(gains["control.rate_gain"].values[0])
+    attitude_factor, rate_factor = tables["control.attitude_factor"], tables["control.rate_factor"]
     T3 = transfer_function("T3", *networks["T3"], attitude_factor * T1.output + rate_factor * T2.output)
 
     alpha_of_state = rigid_body.angle_of_attack(tables, attitude, lateral_velocity, wind.wind + mean_wind)
@@ -185,7 +184,16 @@ def assemble(vehicle: Vehicle, wind_start_covariance: np.ndarray) -> LinearSyste
     for name, process in noises.items():
         entry = vehicle.noise[name]
         column = _deviation_column(
-            vehicle, name, entry.tables, both, tables, x, attitude, alpha, beta, ca.vertcat(alpha_of_state, beta_of_state)
+            vehicle,
+            name,
+            entry.tables,
+            both,
+            tables,
+            x,
+            attitude,
+            alpha,
+            beta,
+            ca.vertcat(alpha_of_state, beta_of_state),
         )
         derivative += column[: x.numel()] * process.deviation
         output += column[x.numel() :] * process.deviation

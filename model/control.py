@@ -4,7 +4,7 @@ beta = T3(s) { K1 T1(s) phi_m + K2 T2(s) phidot_m } + sum_j Y'_j(X_E) eta_j
 phi_m = phi_Z + sum_j Y'_j(X_M) eta_j, and phidot_m likewise.
 
 The report's error signals carry a minus that the lost figure 4-4 undoes once more: with 4-2 as printed only this
-sign closes the loop stably. K1, K2 are the gain schedule relative to its first row; they act behind the networks.
+sign closes the loop stably. K1, K2 are the factors of the gain schedule; they act behind the networks.
 """
 
 from __future__ import annotations
@@ -55,7 +55,8 @@ def transfer_function(name: str, gain: ca.SX, numerator: ca.SX, denominator: ca.
     """Realise gain N(s)/D(s) acting on ``signal`` in scaled companion form.
 
     The k-th state is the (k-1)-th derivative over w0^(k-1), w0 the geometric mean of the poles, so that all states
-    have the size of the signal and no coefficient in A exceeds the largest pole by much.
+    have the size of the signal and the coefficients in A stay near the poles: for T1 612 where the plain form has
+    17529 and the largest pole is 52 rad/s.
     """
     n = denominator.numel() - 1
     a = denominator / denominator[0]
@@ -68,7 +69,5 @@ def transfer_function(name: str, gain: ca.SX, numerator: ca.SX, denominator: ca.
     last = signal - sum((a[n - k] / w0 ** (n - k) * x[k] for k in range(n)), ca.SX(0))
     derivative = w0 * ca.vertcat(x[1:], last)
     direct = b[0]
-    output = direct * signal + sum(
-        ((b[n - k] - direct * a[n - k]) / w0 ** (n - k) * x[k] for k in range(n)), ca.SX(0)
-    )
+    output = direct * signal + sum(((b[n - k] - direct * a[n - k]) / w0 ** (n - k) * x[k] for k in range(n)), ca.SX(0))
     return TransferFunction(x, derivative, gain * output)

@@ -75,7 +75,9 @@ def read_csv_table(file: Path, argument: str, unit: str) -> CsvTable:
     try:
         text = file.read_text(encoding="utf-8-sig")
     except OSError as error:
-        raise DataError(f"cannot be read ({error.strerror or error}); check the name in the TOML file", file=file) from None
+        raise DataError(
+            f"cannot be read ({error.strerror or error}); check the name in the TOML file", file=file
+        ) from None
     except UnicodeDecodeError:
         raise DataError("is not UTF-8 text; save it as CSV", file=file) from None
     rows = [
@@ -122,5 +124,7 @@ def read_csv_table(file: Path, argument: str, unit: str) -> CsvTable:
     if not (steps > 0).all():
         i = int(np.argmin(steps > 0))
         why = "repeats the row above" if steps[i] == 0 else f"comes after {x[i]:g}"
-        raise DataError(f"{x[i + 1]:g} {why}; sort the rows and keep each once", file=file, column=argument, row=table.lines[i + 1])
+        raise DataError(
+            f"{x[i + 1]:g} {why}; sort the rows and keep each once", file=file, column=argument, row=table.lines[i + 1]
+        )
     return table

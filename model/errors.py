@@ -79,6 +79,10 @@ class UnknownNameError(AscentwindError):
         super().__init__(f"there is no {kind} '{name}'{suggestion(name, self.known)}")
 
 
+class ParameterValueError(AscentwindError, ValueError):
+    """A parameter was given a value that the equations cannot use."""
+
+
 class AscentwindWarning(UserWarning):
     """Base of every warning that ascentwind gives."""
 

@@ -21,9 +21,7 @@ def normal_force_slope(tables: TableSymbols, reference_area: ca.SX) -> ca.SX:
     return tables["dynamic_pressure"] * reference_area * tables["normal_force_slope"]
 
 
-def lateral_force(
-    tables: TableSymbols, reference_area: ca.SX, alpha: ca.SX, beta: ca.SX, attitude: ca.SX
-) -> ca.SX:
+def lateral_force(tables: TableSymbols, reference_area: ca.SX, alpha: ca.SX, beta: ca.SX, attitude: ca.SX) -> ca.SX:
     """m Y'' = q A C'_N alpha + F_TCX beta + (F_TX - F_AX) phi_Z, N (4-1; printed delta is a misread phi)."""
     return (
         normal_force_slope(tables, reference_area) * alpha

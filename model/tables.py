@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import casadi as ca
 import numpy as np
@@ -69,7 +70,7 @@ class Table:
         inner = [b for b in sorted(set(self.breaks)) if x[0] < b < x[-1]]
         edges = [x[0], *inner, x[-1]]
         knots, coefficients = [], []
-        for low, high in zip(edges[:-1], edges[1:], strict=True):
+        for low, high in pairwise(edges):
             inside = (x >= low) & (x <= high)
             if inside.sum() < 2:
                 raise DataError(f"table '{self.name}' has too few rows between {low:g} and {high:g} to interpolate")

@@ -36,7 +36,7 @@ TRAJECTORY = (
 )
 PROPULSION = (("thrust", "N", "0"), ("control_thrust", "N", "0"))
 AERODYNAMICS = (("normal_force_slope", "1/rad", ""), ("center_of_pressure", "m", ""))
-GAINS = (("attitude_gain", "1", ""), ("rate_gain", "s", ""))
+GAINS = (("attitude_factor", "1", ""), ("rate_factor", "1", ""))
 SLOSH = (("mass", "kg", "+"), ("frequency", "rad/s", "+"), ("attach_point", "m", ""))
 WIND = (("mean", "m/s", ""), ("standard_deviation", "m/s", "+"))
 
@@ -118,11 +118,9 @@ def load_vehicle(folder: Path) -> Vehicle:
     """
     toml = folder / VEHICLE_FILE
     if not toml.is_file():
-        raise DataError(
-            f"holds no {VEHICLE_FILE}; start from 'ascentwind new-vehicle DIR --from as504'", file=folder
-        )
+        raise DataError(f"holds no {VEHICLE_FILE}; start from 'ascentwind new-vehicle DIR --from as504'", file=folder)
     file = read_vehicle_file(toml)
-    reader = _Reader(folder, toml, file.events)
+    reader = _Reader(folder, toml, file)
     for name, columns in (
         ("rigid_body", RIGID_BODY),
         ("trajectory", TRAJECTORY),
@@ -184,8 +182,8 @@ def load_vehicle(folder: Path) -> Vehicle:
 class _Reader:
     """Collects tables, their sources and the times at which they jump."""
 
-    def __init__(self, folder: Path, toml: Path, events: dict[str, float]):
-        self.folder, self.toml, self.events = folder, toml, events
+    def __init__(self, folder: Path, toml: Path, file: VehicleFile):
+        self.folder, self.toml, self.events, self.start = folder, toml, file.events, file.start_time_s
         self.tables: dict[str, Table] = {}
         self.sources: list[TableSource] = []
         self.discontinuities: set[float] = set()
@@ -222,13 +220,34 @@ class _Reader:
         x = csv.columns["time"]
         if entry.interpolation == "step":
             self.discontinuities.update(x[1:].tolist())
-        for column, unit, _ in columns:
+        for column, unit, sign in columns:
             try:
                 table = Table(prefix + column, unit, x, csv.columns[column], entry.interpolation, breaks)
-                table.polynomial  # noqa: B018  (reports rows too few for a break now, not at first use)
+                self._check_between_rows(table, sign)
             except DataError as error:
-                raise DataError(error.why, file=csv.file, column=column) from None
+                raise DataError(error.why, file=csv.file, column=column, time=error.time) from None
             self.tables[table.name] = table
+
+    def _check_between_rows(self, table: Table, sign: str) -> None:
+        """Refuse an interpolation that leaves the range its rows keep, and an altitude that does not increase."""
+        begin, end = max(self.start, table.argument[0]), table.argument[-1]
+        if begin >= end:
+            return
+        times = np.linspace(begin, end, 20 * table.argument.size)
+        values = table.polynomial(times)
+        if sign == "+" and not (values > 0).all():
+            raise DataError(
+                "the interpolation between rows is not positive; add rows or set interpolation = 'pchip'",
+                time=float(times[int(np.argmin(values))]),
+            )
+        if table.name == "altitude":
+            rate = table.polynomial.derivative()(times)
+            if not (rate > 0).all():
+                raise DataError(
+                    "does not increase, but the wind filter needs a vehicle that ascends; end the tables there, start "
+                    "later or set interpolation = 'pchip'",
+                    time=float(times[int(np.argmin(rate))]),
+                )
 
 
 def _bending_columns(tanks: list[str]):

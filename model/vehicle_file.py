@@ -138,6 +138,7 @@ class VehicleFile(Section):
     title: str
     start_time_s: float
     default_times: str
+    weighting_times_s: tuple[float, ...] = ()
     reference_area_m2: Positive
     reference_area_source: str = ""
     events: dict[str, float] = Field(default_factory=dict)

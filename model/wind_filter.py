@@ -176,7 +176,9 @@ class TwoPartKernel:
         a, b = np.sqrt(1 - b2), np.sqrt(b2)
         return np.outer(a, a) * (1 + r) * np.exp(-r) + np.outer(b, b) * matern(d, self.short_smoothness)
 
-    def shaping_filter(self, altitude: ArrayLike, standard_deviation: ArrayLike, kinks: Sequence[float] = ()) -> ShapingFilter:
+    def shaping_filter(
+        self, altitude: ArrayLike, standard_deviation: ArrayLike, kinks: Sequence[float] = ()
+    ) -> ShapingFilter:
         """Return the exact third-order filter for this correlation and a standard deviation over altitude.
 
         Parameters

@@ -44,6 +44,7 @@ class AdjointHistory:
     ----------
     times : (k,) array
         Increasing; a discontinuity stands twice, its left and right side.
+    adjoint : (k, responses, n) array
     noise : (k, responses, noises) array
         g(t2, t) = B' lambda, from each white noise.
     inputs : (k, responses, inputs) array
@@ -110,7 +111,7 @@ class AdjointSolver:
         """Return adjoint and weighting functions at points at most ``spacing`` seconds apart."""
         system = self._executable.system
         scaled, G, _ = self._terminal(time)
-        times, adjoints, noise, inputs = [], [], [], []
+        times, adjoints, noise, inputs = [], [], [], []  # latest first
         for interval in reversed(intervals(system, system.start, time)):
             span = interval.end - interval.begin
             points = max(1, int(np.ceil(span / spacing - 1e-9)))
@@ -118,14 +119,15 @@ class AdjointSolver:
             where = f"of the adjoint from {interval.end:g} s back to {interval.begin:g} s (t2 = {time:g} s)"
             states, _, _ = self._integrator.run(scaled.ravel("F"), parameters, where, points)
             columns = np.concatenate([scaled.ravel("F")[:, None], states], axis=1)
-            for t, column in zip(np.linspace(interval.end, interval.begin, points + 1), columns.T, strict=True):
-                adjoint = column.reshape(scaled.shape, order="F") / self._state_scale[:, None] * self._output_scale
-                matrices = self._executable.matrices(float(t), interval.low, interval.high)
-                times.append(float(t))
-                adjoints.append(adjoint.T)
-                noise.append(adjoint.T @ matrices["B"])
-                inputs.append(adjoint.T @ matrices["E"])
+            at = np.linspace(interval.end, interval.begin, points + 1)
+            B, E = self._executable.input_matrices(at, interval.low, interval.high)
+            stacked = columns.T.reshape(points + 1, *scaled.shape[::-1])
+            adjoint = stacked / self._state_scale * self._output_scale[:, None]
+            times.append(at)
+            adjoints.append(adjoint)
+            noise.append(adjoint @ B)
+            inputs.append(adjoint @ E)
             scaled = states[:, -1].reshape(scaled.shape, order="F")
-        return AdjointHistory(
-            np.array(times[::-1]), np.array(adjoints[::-1]), np.array(noise[::-1]), np.array(inputs[::-1]), G
-        )
+        latest_first = (np.concatenate(parts) for parts in (times, adjoints, noise, inputs))
+        t, adjoint, from_noise, from_inputs = (part[::-1] for part in latest_first)
+        return AdjointHistory(t, adjoint, from_noise, from_inputs, G)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Literal
+from itertools import pairwise
+from typing import Any, Literal
 
 import casadi as ca
 import numpy as np
@@ -38,7 +38,7 @@ class IntegratorOptions:
 
     method: Method = "adams"
     iteration: Iteration = "newton"
-    relative_tolerance: float = 1e-6
+    relative_tolerance: float = 1e-7
     max_steps: int = 1_000_000
 
     def __post_init__(self):
@@ -51,7 +51,7 @@ class IntegratorOptions:
                 f"a relative tolerance of {self.relative_tolerance:g} cannot be met; choose 1e-13 to 1e-2"
             )
 
-    def casadi_options(self) -> dict[str, object]:
+    def casadi_options(self) -> dict[str, Any]:
         return {
             "linear_multistep_method": self.method,
             "nonlinear_solver_iteration": self.iteration,
@@ -82,10 +82,7 @@ def intervals(system: LinearSystem, begin: float, end: float) -> list[Interval]:
     inner = [d for d in system.discontinuities if begin < d < end]
     edges = [begin, *inner, end]
     jumps = set(system.discontinuities)
-    return [
-        Interval(a, b, a, float(np.nextafter(b, -np.inf)) if b in jumps else b)
-        for a, b in zip(edges[:-1], edges[1:], strict=True)
-    ]
+    return [Interval(a, b, a, float(np.nextafter(b, -np.inf)) if b in jumps else b) for a, b in pairwise(edges)]
 
 
 @dataclass
@@ -135,7 +132,7 @@ class Integrator:
         if points not in self._by_count:
             grid = np.linspace(0.0, 1.0, points + 1)[1:]
             self._by_count[points] = ca.integrator(
-                f"{self._function.name()}_{points}", "cvodes", self._function, 0.0, list(grid), self._options
+                f"{self._function.name()}_{points}", "cvodes", self._function, 0.0, grid.tolist(), self._options
             )
         integrator = self._by_count[points]
         try:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import casadi as ca
 import numpy as np
@@ -77,7 +78,9 @@ def mean_response(executable: ExecutableSystem, times: NDArray[np.float64]) -> M
 def with_mean_tables(executable: ExecutableSystem) -> ExecutableSystem:
     """Return the system with its tables of the mean response filled in, if it has any."""
     system = executable.system
-    at = next((i for i, g in enumerate(executable.groups) if g.name == "mean" and set(g.names) == set(MEAN_TABLES)), None)
+    at = next(
+        (i for i, g in enumerate(executable.groups) if g.name == "mean" and set(g.names) == set(MEAN_TABLES)), None
+    )
     if at is None:
         return executable
     group = executable.groups[at]
@@ -97,8 +100,5 @@ def _splines(group: TableGroup, values: NDArray[np.float64], discontinuities: tu
     """Interpolate between discontinuities, across which the mean has corners."""
     knots = group.knots
     edges = [0, *(int(np.argmin(np.abs(knots - d))) for d in discontinuities), knots.size - 1]
-    pieces = [
-        np.moveaxis(CubicSpline(knots[a : b + 1], values[a : b + 1]).c[::-1], 0, 1)
-        for a, b in zip(edges[:-1], edges[1:], strict=True)
-    ]
+    pieces = [np.moveaxis(CubicSpline(knots[a : b + 1], values[a : b + 1]).c[::-1], 0, 1) for a, b in pairwise(edges)]
     return replace(group, coefficients=np.concatenate(pieces))

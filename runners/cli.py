@@ -1,0 +1,221 @@
+"""The command line: ``ascentwind run``, ``vehicles``, ``new-vehicle``, ``inspect``, ``regenerate``, ``doctor``."""
+
+from __future__ import annotations
+
+import logging
+import sys
+import warnings
+from pathlib import Path
+from typing import Annotated, TextIO
+
+import typer
+from rich.console import Console
+from rich.logging import RichHandler
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from ..model.errors import AscentwindError, AscentwindWarning
+
+app = typer.Typer(
+    add_completion=False,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    help="Response statistics of ascending launch vehicles in a random wind, by the method of adjoint systems.",
+)
+console = Console()
+errors = Console(stderr=True)
+
+VehicleArgument = Annotated[str, typer.Argument(help="A shipped vehicle ('ascentwind vehicles') or a vehicle folder.")]
+
+
+@app.command()
+def run(
+    vehicle: VehicleArgument,
+    times: Annotated[str | None, typer.Option(help="End times in s: START:STOP:STEP or T1,T2,...")] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for results; VEHICLE-results without it.")] = None,
+    method: Annotated[str, typer.Option(help="CVODES formulas: adams or bdf.")] = "adams",
+    tolerance: Annotated[float, typer.Option(help="Relative tolerance of the integration.")] = 1e-7,
+) -> None:
+    """Mean, variance and mean + 3 sigma of all responses over flight time: tables and figures."""
+    from .figures import response_figure, weighting_figure, words, write_figure
+    from .integration import IntegratorOptions
+    from .output import prepare_folder, write_statistics
+    from .study import Study
+    from .times import parse_times
+
+    folder = out or Path(f"{Path(vehicle).name}-results")
+    prepare_folder(folder)
+    options = IntegratorOptions(method=method, relative_tolerance=tolerance)  # type: ignore[arg-type]
+    with console.status("loading and preparing code"):
+        study = Study.load(vehicle)
+    assert study.vehicle is not None
+    end_times = parse_times(times or study.vehicle.file.default_times)
+    families = [t for t in study.vehicle.file.weighting_times_s if study.system.start < t <= study.system.end]
+    with _progress() as progress:
+        task = progress.add_task("end times", total=len(end_times))
+        statistics = study.response_statistics(
+            end_times,
+            options=options,
+            progress=lambda t: progress.update(task, advance=1, description=f"end time {t:g} s"),
+        )
+        written = write_statistics(statistics, folder)
+        task = progress.add_task("figures", total=len(statistics["response"]) + len(families) + 1)
+        for output in study.system.outputs:
+            title = f"{study.vehicle.title}\n{words(output.name).capitalize()}, mean and mean + 3σ"
+            figure = response_figure(statistics, output.name, title)
+            written += write_figure(figure, folder, output.name)
+            progress.advance(task)
+        weighting = []
+        for t in families:
+            weighting.append(study.weighting_function(t))
+            progress.advance(task)
+        if weighting:
+            first = study.system.outputs[0]
+            title = f"{study.vehicle.title}\nWeighting function from wind to {words(first.name)}"
+            figure = weighting_figure(weighting, first.name, first.unit, title)
+            written += write_figure(figure, folder, "weighting_functions")
+        progress.advance(task)
+    _print_peaks(statistics)
+    top = study.vehicle.wind.mean.argument[-1]
+    if study.tables(end_times[-1])["altitude"] > top:
+        console.print(f"Above {top / 1000:g} km the wind tables end and their last values are held.", style="dim")
+    console.print(f"{len(written)} files in {folder}: {', '.join(p.name for p in written)}", soft_wrap=True)
+
+
+def _progress() -> Progress:
+    return Progress(
+        SpinnerColumn(),
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        console=console,
+        transient=True,
+    )
+
+
+def _print_peaks(statistics) -> None:
+    from .figures import display, words
+    from .peaks import peaks
+
+    found = peaks(statistics)
+    table = Table("response", title="Peaks of mean + 3 sigma")
+    for column in ("time", "mean + 3σ", "mean", "σ"):
+        table.add_column(column, justify="right", no_wrap=True)
+    for peak in found:
+        factor, unit = display(peak.unit)
+        numbers = (f"{factor * x:.4g} {unit}" for x in (peak.value, peak.mean, peak.std))
+        table.add_row(words(peak.response), f"{peak.time:g} s{'*' if peak.at_end else ''}", *numbers)
+    console.print(table)
+    table = Table("response", title="Share of the variance at the peak")
+    for source in found[0].shares:
+        table.add_column(words(source), justify="right")
+    for peak in found:
+        table.add_row(words(peak.response), *(f"{100 * share:.2f} %" for share in peak.shares.values()))
+    console.print(table)
+    at_end = any(peak.at_end for peak in found)
+    if at_end:
+        console.print("* on the first or last end time asked for; the peak of the flight may lie beyond", style="dim")
+
+
+@app.command()
+def vehicles() -> None:
+    """The vehicles that ship with ascentwind."""
+    from ..model.library import built_in_vehicles
+    from ..model.vehicle import load_vehicle
+
+    table = Table("name", "what", "times (s)", "folder")
+    for name, folder in built_in_vehicles().items():
+        vehicle = load_vehicle(folder)
+        table.add_row(name, vehicle.title, f"{vehicle.start:g} - {vehicle.end:g}", str(folder))
+    console.print(table)
+
+
+@app.command("new-vehicle")
+def new_vehicle(
+    folder: Annotated[Path, typer.Argument(help="Folder to make.")],
+    source: Annotated[str, typer.Option("--from", help="Vehicle to start from.")] = "as504",
+) -> None:
+    """A vehicle folder of your own to edit: one TOML file and CSV tables."""
+    from .new_vehicle import copy_vehicle
+
+    copied = copy_vehicle(source, folder)
+    console.print(f"{len(copied)} files in {folder}; edit vehicle.toml, then 'ascentwind run {folder}'", soft_wrap=True)
+
+
+@app.command()
+def inspect(
+    vehicle: VehicleArgument,
+    time: Annotated[float, typer.Option(help="Flight time, s.")],
+    json: Annotated[bool, typer.Option("--json", help="As JSON instead of tables.")] = False,
+) -> None:
+    """Every table value, the matrices A, B, C, D and the roots at a time."""
+    from .inspect_system import inspection, print_inspection
+    from .study import Study
+
+    found = inspection(Study.load(vehicle), time)
+    if json:
+        import json as json_module
+
+        typer.echo(json_module.dumps(found, indent=1))
+    else:
+        print_inspection(found, console)
+
+
+@app.command()
+def regenerate(
+    vehicle: Annotated[str, typer.Argument(help="A shipped vehicle or a vehicle folder.")] = "as504",
+    out: Annotated[Path, typer.Option(help="Folder in which the vehicle gets a folder of its own.")] = Path(
+        "generated"
+    ),
+) -> None:
+    """Write the readable C of a vehicle and its manifest anew."""
+    from .regenerate import regenerate as write
+
+    for path, state in write(vehicle, out).items():
+        console.print(f"{path}: {state}", soft_wrap=True)
+
+
+@app.command()
+def doctor() -> None:
+    """Which compiler, CasADi, cache and engine would be used, and what is missing."""
+    from .doctor import diagnose
+
+    table = Table("what", "found", "")
+    verdicts = diagnose()
+    for line in verdicts:
+        table.add_row(line.what, line.found, "[green]ok[/]" if line.good else f"[yellow]{line.advice}[/]")
+    console.print(table)
+
+
+def main() -> None:
+    """Run the command line; errors that ascentwind raises on purpose end with their sentence and exit code 2."""
+    logging.basicConfig(
+        level=logging.INFO,
+        format="%(message)s",
+        handlers=[RichHandler(console=errors, show_time=False, show_path=False)],
+    )
+    warnings.showwarning = _show_warning
+    try:
+        app()
+    except AscentwindError as error:
+        errors.print(f"[bold red]error:[/] {_escape(str(error))}", soft_wrap=True, highlight=False)
+        sys.exit(2)
+
+
+def _show_warning(
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    file: TextIO | None = None,
+    line: str | None = None,
+) -> None:
+    if issubclass(category, AscentwindWarning):
+        errors.print(f"[yellow]warning:[/] {_escape(str(message))}", soft_wrap=True, highlight=False)
+    else:
+        sys.stderr.write(warnings.formatwarning(message, category, filename, lineno, line))
+
+
+def _escape(text: str) -> str:
+    return text.replace("[", r"\[")

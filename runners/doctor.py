@@ -1,0 +1,55 @@
+"""What this machine offers: compiler, CasADi and its CVODES, cache, engine."""
+
+from __future__ import annotations
+
+import platform
+from dataclasses import dataclass
+
+import casadi as ca
+
+from ..codegen.cache import CacheError, cache_folder
+from ..codegen.compiler import CompilerError, find_compiler
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One line of a diagnosis."""
+
+    what: str
+    found: str
+    good: bool
+    advice: str = ""
+
+
+def diagnose() -> list[Finding]:
+    """Look at everything that ascentwind depends on."""
+    findings = [Finding("Python", platform.python_version(), True)]
+    try:
+        compiler = find_compiler()
+        if compiler:
+            findings.append(Finding("C compiler", f"{' '.join(compiler.command)}: {compiler.version}", True))
+        else:
+            findings.append(
+                Finding(
+                    "C compiler", "none", False, "install cc, gcc or clang, or set CC, for speed; results are the same"
+                )
+            )
+    except CompilerError as error:
+        compiler = None
+        findings.append(Finding("C compiler", str(error.output), False, "point CC to a compiler that exists"))
+    findings.append(Finding("CasADi", ca.CasadiMeta.version(), True))
+    has_cvodes = ca.has_integrator("cvodes")
+    findings.append(
+        Finding("CVODES", "in CasADi" if has_cvodes else "missing", has_cvodes, "reinstall casadi from its wheel")
+    )
+    try:
+        folder = cache_folder()
+        count = len(list(folder.glob("*.so")))
+        findings.append(Finding("cache", f"{folder} ({count} compiled libraries)", True))
+        cached = True
+    except CacheError as error:
+        findings.append(Finding("cache", "not usable", False, str(error)))
+        cached = False
+    engine = "compiled C" if compiler and cached else "CasADi's interpreter"
+    findings.append(Finding("engine", f"CVODES with {engine}", True))
+    return findings

@@ -1,0 +1,78 @@
+"""Writing results: a folder checked beforehand, every file whole or not at all."""
+
+from __future__ import annotations
+
+import csv
+import io
+import os
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from ..model.errors import OutputFolderError
+from .statistics import ResponseStatistics
+
+COLUMNS = ("time_s", "response", "unit", "source", "mean", "variance", "std", "mean_plus_3sigma")
+
+
+def prepare_folder(folder: Path) -> None:
+    """Make a folder and make sure that it can be written, before anything is computed.
+
+    Raises
+    ------
+    OutputFolderError
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise OutputFolderError(
+            f"results cannot be written to {folder} ({error.strerror or error}); choose another folder with --out"
+        ) from None
+
+
+def write_whole(path: Path, write: Callable[[Path], object]) -> Path:
+    """Let ``write`` fill a temporary file beside ``path`` and put it in place by rename.
+
+    Raises
+    ------
+    OutputFolderError
+        The file that stood at ``path`` before, if any, is untouched.
+    """
+    temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
+    try:
+        write(temporary)
+        temporary.replace(path)
+    except OSError as error:
+        raise OutputFolderError(
+            f"{path} cannot be written ({error.strerror or error}); nothing was left there"
+        ) from None
+    finally:
+        temporary.unlink(missing_ok=True)
+    return path
+
+
+def write_statistics(statistics: ResponseStatistics, folder: Path) -> list[Path]:
+    """Write statistics.nc (NetCDF) and statistics.csv (one row a time, response and source)."""
+    text = statistics_csv(statistics)
+    return [
+        write_whole(folder / "statistics.nc", lambda p: statistics.to_netcdf(p, engine="scipy")),
+        write_whole(folder / "statistics.csv", lambda p: p.write_text(text)),
+    ]
+
+
+def statistics_csv(statistics: ResponseStatistics) -> str:
+    """Return the statistics as tidy CSV."""
+    buffer = io.StringIO()
+    writer = csv.writer(buffer, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    values = {name: statistics[name].values for name in COLUMNS[4:]}
+    for k, time in enumerate(statistics["time"].values):
+        for r, response in enumerate(statistics["response"].values):
+            for s, source in enumerate(statistics["source"].values):
+                numbers = (np.format_float_scientific(values[name][k, r, s], 9) for name in COLUMNS[4:])
+                writer.writerow([f"{time:g}", response, statistics["unit"].values[r], source, *numbers])
+    return buffer.getvalue()

@@ -1,0 +1,74 @@
+"""The readable C of a vehicle, kept beside the code, and the manifest that says what it is."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+from typing import Any
+
+from ..codegen.cache import describe_changes
+from ..codegen.functions import core_functions
+from ..codegen.source import c_source
+from ..model.system import LinearSystem
+from .output import prepare_folder, write_whole
+from .study import Study
+
+
+def generated_files(system: LinearSystem) -> dict[str, str]:
+    """Return the texts of NAME.c and manifest.json for a system."""
+    source = c_source(system, core_functions(system))
+    manifest: dict[str, Any] = {
+        "name": system.name,
+        "source": f"{system.name}.c",
+        "sha256": hashlib.sha256(source.encode()).hexdigest(),
+        "sizes": {
+            "states": len(system.states),
+            "noises": len(system.noises),
+            "outputs": len(system.outputs),
+            "parameters": len(system.parameters),
+            "table_values": system.v.numel(),
+            "table_numbers": sum(g.size for g in system.tables),
+        },
+        "structure": dict(system.structure),
+        "states": list(system.state_names),
+        "noises": {n.name: n.source for n in system.noises},
+        "outputs": {o.name: o.unit for o in system.outputs},
+        "parameters": {p.name: p.unit for p in system.parameters},
+        "tables": {
+            g.name: {"argument": g.argument, "knots": g.knots.size, "names": list(g.names)} for g in system.tables
+        },
+    }
+    return {f"{system.name}.c": source, "manifest.json": json.dumps(manifest, indent=1) + "\n"}
+
+
+def regenerate(vehicle: str | Path, folder: Path) -> dict[Path, str]:
+    """Write the generated files of a vehicle and say of each whether and why it changed.
+
+    Raises
+    ------
+    OutputFolderError
+    """
+    system = Study.load(vehicle, compile=False).system
+    target = folder / system.name
+    prepare_folder(target)
+    before = _structure(target / "manifest.json")
+    states = {}
+    for name, text in generated_files(system).items():
+        path = target / name
+        if path.is_file() and path.read_text() == text:
+            states[path] = "unchanged"
+            continue
+        changes = describe_changes(before, dict(system.structure)) if before else []
+        states[path] = (
+            f"written ({'; '.join(changes) or ('equations, names or code generator changed' if before else 'new')})"
+        )
+        write_whole(path, lambda p, text=text: p.write_text(text))
+    return states
+
+
+def _structure(manifest: Path) -> dict[str, str] | None:
+    try:
+        return json.loads(manifest.read_text())["structure"]
+    except (OSError, ValueError, KeyError):
+        return None

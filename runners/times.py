@@ -1,0 +1,33 @@
+"""End times written as text: 'start:stop:step' or 'a,b,c', in seconds."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..model.errors import TimeRangeError
+
+MOST = 100_000
+
+
+def parse_times(text: str) -> list[float]:
+    """Return the times that a text names, the stop included.
+
+    Raises
+    ------
+    TimeRangeError
+        With the form expected.
+    """
+    form = "write START:STOP:STEP or T1,T2,... in seconds, such as 40:100:5"
+    try:
+        if ":" not in text:
+            return [float(part) for part in text.split(",")]
+        start, stop, step = (float(part) for part in text.split(":"))
+    except ValueError:
+        raise TimeRangeError(f"'{text}' does not name times; {form}") from None
+    if not all(np.isfinite((start, stop, step))) or step <= 0 or stop < start:
+        raise TimeRangeError(
+            f"'{text}' names no times: the stop comes before the start or the step is not positive; {form}"
+        )
+    if (stop - start) / step > MOST:
+        raise TimeRangeError(f"'{text}' names more than {MOST} times; take a larger step")
+    return [float(t) for t in start + step * np.arange(int(np.floor((stop - start) / step + 1e-9)) + 1)]

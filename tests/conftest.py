@@ -1,0 +1,46 @@
+"""Fixtures: a private cache for compiled code, the shipped vehicle, and a copy of it to spoil."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+from ascentwind.model.library import built_in_vehicles
+from ascentwind.runners import Study
+
+
+@pytest.fixture(scope="session", autouse=True)
+def cache(tmp_path_factory):
+    with pytest.MonkeyPatch.context() as patch:
+        folder = tmp_path_factory.mktemp("cache")
+        folder.chmod(0o700)
+        patch.setenv("ASCENTWIND_CACHE", str(folder))
+        yield folder
+
+
+@pytest.fixture(scope="session")
+def as504(cache) -> Study:
+    return Study.load("as504")
+
+
+@pytest.fixture
+def vehicle_folder(tmp_path) -> Path:
+    """A copy of AS-504 that a test may edit."""
+    folder = tmp_path / "vehicle"
+    shutil.copytree(built_in_vehicles()["as504"], folder)
+    return folder
+
+
+@pytest.fixture
+def edit(vehicle_folder):
+    """Replace text in a file of the copied vehicle; the text must be there."""
+
+    def replace(old: str, new: str, file: str = "vehicle.toml") -> Path:
+        path = vehicle_folder / file
+        text = path.read_text()
+        assert old in text
+        path.write_text(text.replace(old, new))
+        return vehicle_folder
+
+    return replace
