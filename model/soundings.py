@@ -152,7 +152,9 @@ def read_soundings(file: Path, drop_incomplete: bool = False) -> Soundings:
         raise DataError(f"holds {len(kept)} complete profiles; statistics need {FEWEST} at least", file=file)
     data = np.array([[levels[h] for h in altitude] for levels in kept.values()])
     day = np.array([dates[n] for n in kept])
-    return Soundings(altitude, data[:, :, 0], data[:, :, 1], day, len(profiles) - len(kept), f"soundings of {file.name}")
+    return Soundings(
+        altitude, data[:, :, 0], data[:, :, 1], day, len(profiles) - len(kept), f"soundings of {file.name}"
+    )
 
 
 def _number(cell: str, column: str, file: Path, line: int) -> float:
@@ -161,7 +163,12 @@ def _number(cell: str, column: str, file: Path, line: int) -> float:
     except ValueError:
         value = np.nan
     if not np.isfinite(value):
-        raise DataError(f"'{cell.strip()}' is not a finite number; fill it or remove the profile", file=file, column=column, row=line)
+        raise DataError(
+            f"'{cell.strip()}' is not a finite number; fill it or remove the profile",
+            file=file,
+            column=column,
+            row=line,
+        )
     return value
 
 
@@ -169,4 +176,6 @@ def _day(cell: str, file: Path, line: int) -> float:
     try:
         return float(datetime.date.fromisoformat(cell.strip()[:10]).toordinal())
     except ValueError:
-        raise DataError(f"'{cell.strip()}' is not a date; write 2008-03-17", file=file, column="date", row=line) from None
+        raise DataError(
+            f"'{cell.strip()}' is not a date; write 2008-03-17", file=file, column="date", row=line
+        ) from None

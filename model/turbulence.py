@@ -145,7 +145,11 @@ def add_filters(first: ShapingFilter, second: ShapingFilter, correlation: Table 
     low, high = max(first.altitude[0], second.altitude[0]), min(first.altitude[-1], second.altitude[-1])
     if not high > low:
         raise DataError(f"filters '{first.name}' and '{second.name}' share no altitudes")
-    h = np.unique(np.concatenate([f.altitude[(f.altitude >= low) & (f.altitude <= high)] for f in (first, second)] + [[low, high]]))
+    h = np.unique(
+        np.concatenate(
+            [f.altitude[(f.altitude >= low) & (f.altitude <= high)] for f in (first, second)] + [[low, high]]
+        )
+    )
     h = h[np.concatenate([[True], np.diff(h) > 1e-6])]
     values = [[f.at(x) for x in h] for f in (first, second)]
     F = np.array([block_diag(a[0], b[0]) for a, b in zip(*values, strict=True)])

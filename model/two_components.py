@@ -27,7 +27,9 @@ def plane_weights(azimuth: float, plane: str) -> tuple[float, float]:
     if plane not in PLANES:
         raise UnknownNameError("plane", plane, PLANES)
     if not -2 * np.pi <= azimuth <= 2 * np.pi:
-        raise DataError(f"an azimuth of {azimuth:g} rad is more than a full turn; are these degrees? Convert them to rad")
+        raise DataError(
+            f"an azimuth of {azimuth:g} rad is more than a full turn; are these degrees? Convert them to rad"
+        )
     s, c = np.sin(azimuth), np.cos(azimuth)
     return (float(s), float(c)) if plane == "pitch" else (float(c), float(-s))
 
@@ -50,7 +52,10 @@ def wind_in_plane(
     parts = [_scaled(w.shaping_filter, x) for w, x in zip((zonal, meridional), weights, strict=True)]
     total = add_filters(parts[0], parts[1], noise_correlation)
     h = np.union1d(zonal.mean.argument, meridional.mean.argument)
-    h = h[(h >= max(t.mean.argument[0] for t in (zonal, meridional))) & (h <= min(t.mean.argument[-1] for t in (zonal, meridional)))]
+    h = h[
+        (h >= max(t.mean.argument[0] for t in (zonal, meridional)))
+        & (h <= min(t.mean.argument[-1] for t in (zonal, meridional)))
+    ]
     values = weights[0] * zonal.mean.polynomial(h) + weights[1] * meridional.mean.polynomial(h)
     return WindModel(Table("wind.mean", "m/s", h, values, "pchip"), total)
 

@@ -96,7 +96,9 @@ class WindStatistics:
                 raise DataError(f"wind statistics '{self.name}': {label} has shape {values.shape} for {k} altitudes")
             if not np.isfinite(values).all():
                 i = int(np.argmin(np.isfinite(values)))
-                raise DataError(f"wind statistics '{self.name}': {label} at {h[i]:g} m is missing; fill or drop the level")
+                raise DataError(
+                    f"wind statistics '{self.name}': {label} at {h[i]:g} m is missing; fill or drop the level"
+                )
         if not np.isfinite(h).all() or not (np.diff(h) > 0).all():
             raise DataError(f"wind statistics '{self.name}': altitudes must be finite and increase")
         _check_plausible(self.name, h, self.mean, self.standard_deviation)
@@ -177,7 +179,9 @@ def statistics_from_covariance(
     variance = np.diag(matrix)
     if not np.isfinite(matrix).all() or (variance <= 0).any():
         i = int(np.argmax(~np.isfinite(matrix).all(axis=1) | ~(variance > 0)))
-        raise DataError(f"the covariance of '{name}' has a variance or entry in row {i} that is not finite and positive")
+        raise DataError(
+            f"the covariance of '{name}' has a variance or entry in row {i} that is not finite and positive"
+        )
     sigma = np.sqrt(variance)
     correlation = matrix / np.outer(sigma, sigma)
     np.fill_diagonal(correlation, 1.0)
@@ -186,7 +190,9 @@ def statistics_from_covariance(
         if repaired.largest_change > 1e-9:
             warnings.warn(RepairWarning(f"wind statistics '{name}': {repaired}"), stacklevel=2)
             correlation, source = repaired.matrix, f"{source}; {repaired}"
-    return WindStatistics(name, np.asarray(altitude, float), np.asarray(mean, float), sigma, correlation, independent_samples, source)
+    return WindStatistics(
+        name, np.asarray(altitude, float), np.asarray(mean, float), sigma, correlation, independent_samples, source
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,13 +233,22 @@ class TwoComponentStatistics:
 def _check_plausible(name: str, altitude: NDArray, mean: NDArray, deviation: NDArray) -> None:
     where = f"wind statistics '{name}'"
     if altitude[0] < -500 or altitude[-1] > LARGEST_ALTITUDE:
-        raise DataError(f"{where} run from {altitude[0]:g} to {altitude[-1]:g} m; are these feet? Convert them to metres")
+        raise DataError(
+            f"{where} run from {altitude[0]:g} to {altitude[-1]:g} m; are these feet? Convert them to metres"
+        )
     if altitude[-1] - altitude[0] < SMALLEST_RANGE:
-        raise DataError(f"{where} span only {altitude[-1] - altitude[0]:g} m; are these kilometres? Convert them to metres")
+        raise DataError(
+            f"{where} span only {altitude[-1] - altitude[0]:g} m; are these kilometres? Convert them to metres"
+        )
     if (deviation <= 0).any():
         i = int(np.argmin(deviation))
-        raise DataError(f"{where}: the standard deviation at {altitude[i]:g} m is {deviation[i]:g}; it must be positive")
-    for label, values, limit in (("mean", np.abs(mean), LARGEST_MEAN), ("standard deviation", deviation, LARGEST_DEVIATION)):
+        raise DataError(
+            f"{where}: the standard deviation at {altitude[i]:g} m is {deviation[i]:g}; it must be positive"
+        )
+    for label, values, limit in (
+        ("mean", np.abs(mean), LARGEST_MEAN),
+        ("standard deviation", deviation, LARGEST_DEVIATION),
+    ):
         if (values > limit).any():
             i = int(np.argmax(values))
             raise DataError(

@@ -84,8 +84,11 @@ def propagated_covariance(
         F, G, _ = shaping_filter.at(h)
         return F, G
 
+    samples = shaping_filter.altitude
     for i, target in enumerate(np.maximum(altitude, start)):
-        for edges in divided(np.array([position, target]), spacing) if target > position else []:
+        # coefficients are smooth between samples: no step goes across one
+        inner = samples[(samples > position) & (samples < target)]
+        for edges in divided(np.array([position, *inner, target]), spacing) if target > position else []:
             for a, b in zip(edges[:-1], edges[1:], strict=True):
                 phi, added = transition(matrices, a, b)
                 covariance = phi @ covariance @ phi.T + added

@@ -85,9 +85,13 @@ def fit_covariance(statistics: WindStatistics) -> AnalyticCovariance:
     options = FitOptions(max_evaluations=2000, tolerance=1e-9)
     for i, reference in enumerate(h):
         form = _correlation(reference)
-        start = np.array([0.5, 0.1, 0.5, 0.0, 0.0, 0.0]) if reference <= SPLIT else np.array([0.2, 0.05, 0.1, 0.05, 0.3])
+        start = (
+            np.array([0.5, 0.1, 0.5, 0.0, 0.0, 0.0]) if reference <= SPLIT else np.array([0.2, 0.05, 0.1, 0.05, 0.3])
+        )
         b = ca.SX.sym("b", start.size)
-        curve = ca.vertcat(*(form(float(x), b, float(reference)) - r for x, r in zip(h, statistics.correlation[i], strict=True)))
+        curve = ca.vertcat(
+            *(form(float(x), b, float(reference)) - r for x, r in zip(h, statistics.correlation[i], strict=True))
+        )
         # a slight pull to the start keeps exponents where three terms say the same thing
         fit = fit_least_squares(ca.vertcat(curve, 1e-4 * (b - start)), b, start, options)
         fitted.append(fit.unknowns)

@@ -13,7 +13,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from ..model.range_reference import COMPONENTS, KERNELS, LAYER, LEVELS, MONTHS, PERIODS, WIND_DATA, range_reference, read_rows
+from ..model.range_reference import (
+    COMPONENTS,
+    KERNELS,
+    LAYER,
+    LEVELS,
+    MONTHS,
+    PERIODS,
+    WIND_DATA,
+    range_reference,
+    read_rows,
+)
 from ..model.tables import Table
 from ..model.wind_filter import TwoPartKernel
 
@@ -69,7 +79,11 @@ def measured_pairs(period: str, component: str) -> list[LevelPair]:
     levels = [LAYER, *LEVELS]
     total, weight, means = np.zeros((5, 5)), 0.0, []
     for month in range(1, 13):
-        statistics = {r["level [hPa]"]: r for r in read_rows(WIND_DATA / "level_statistics_2008_2022.csv") if r["month"] == str(month)}
+        statistics = {
+            r["level [hPa]"]: r
+            for r in read_rows(WIND_DATA / "level_statistics_2008_2022.csv")
+            if r["month"] == str(month)
+        }
         sd = np.array([float(statistics[k][f"standard_deviation_{letter} [m/s]"]) for k in levels])
         n = float(statistics["850"]["soundings [1]"])
         r = np.eye(5)
@@ -108,7 +122,9 @@ def kernel_correlations(kernel: TwoPartKernel, pairs: list[LevelPair], deviation
     def inner(a: str, b: str) -> float:
         return float(weights[a] @ correlation @ weights[b])
 
-    return np.array([inner(p.first, p.second) / np.sqrt(inner(p.first, p.first) * inner(p.second, p.second)) for p in pairs])
+    return np.array(
+        [inner(p.first, p.second) / np.sqrt(inner(p.first, p.first) * inner(p.second, p.second)) for p in pairs]
+    )
 
 
 def fit_kernel(pairs: list[LevelPair], deviation: Table, start: TwoPartKernel) -> TwoPartKernel:

@@ -33,7 +33,9 @@ def covariance_interval(
     """
     matrix = np.asarray(covariance, float)
     if not samples > 2 or not 0 < confidence < 1:
-        raise DataError(f"an interval needs more than two samples and a confidence below 1, not {samples:g}, {confidence:g}")
+        raise DataError(
+            f"an interval needs more than two samples and a confidence below 1, not {samples:g}, {confidence:g}"
+        )
     freedom = samples - 1
     sigma = np.sqrt(np.diag(matrix))
     scale = np.outer(sigma, sigma)
@@ -47,7 +49,9 @@ def covariance_interval(
     return low * scale, high * scale
 
 
-def share_inside(covariance: ArrayLike, sample_covariance: ArrayLike, samples: float, confidence: float = 0.90) -> float:
+def share_inside(
+    covariance: ArrayLike, sample_covariance: ArrayLike, samples: float, confidence: float = 0.90
+) -> float:
     """Return the share of the distinct entries of ``covariance`` that lie inside the interval of the samples."""
     low, high = covariance_interval(sample_covariance, samples, confidence)
     matrix = np.asarray(covariance, float)

@@ -13,6 +13,8 @@ from scipy.optimize import least_squares
 
 from ..model.errors import AscentwindError, AscentwindWarning
 
+LARGEST = 1e10  # a residual above it is nonsense
+
 Progress = Callable[[int, float], None]
 
 
@@ -107,7 +109,8 @@ def fit_least_squares(residuals: ca.SX, unknowns: ca.SX, start: NDArray[np.float
         nonlocal best, evaluations
         r = np.array(value(x)).ravel()
         evaluations += 1
-        cost = 0.5 * float(r @ r) if np.isfinite(r).all() else np.inf
+        usable = np.isfinite(r).all() and np.abs(r).max() < LARGEST
+        cost = 0.5 * float(r @ r) if usable else np.inf
         if cost < best[0]:
             best = (cost, x.copy())
         if options.progress is not None:
@@ -115,7 +118,7 @@ def fit_least_squares(residuals: ca.SX, unknowns: ca.SX, start: NDArray[np.float
         if evaluations > 1 and time.monotonic() - begin > options.time_limit:
             raise _Timeout
         # a step into nonsense must look bad to the optimiser, not stop it
-        return r if np.isfinite(r).all() else np.full(r.size, 1e10)
+        return r if usable else np.full(r.size, LARGEST)
 
     first = evaluate(np.asarray(start, float))
     start_cost = best[0]

@@ -8,7 +8,7 @@ may vanish. A first-order mode and a rotating pair need no division:
 
     z1' = -a1' z1 + n,   [z2; z3]' = [-a2' -theta'; theta' -a2'] [z2; z3] + [c; c] n,   W = H(h) z,
 
-c = cos(pi/4), H = [A e^a1, B e^a2 cos(theta + psi + pi/4), -B e^a2 sin(theta + psi + pi/4)]; its response to an impulse at h is (3-10). The sign of
+c = cos(pi/4), H = [A e^a1, B e^a2 cos(theta + psi + pi/4), B e^a2 sin(theta + psi + pi/4)]; its response to an impulse at h is (3-10). The sign of
 the exponents: a response at h2 to an impulse at h < h2 grows with h, so a1 and a2 increase.
 """
 
@@ -71,7 +71,13 @@ class ResponseForm:
 
 
 def response_result(
-    method: str, statistics: WindStatistics, form: ResponseForm, knots: NDArray, values: NDArray, start: NDArray, fit: Fit
+    method: str,
+    statistics: WindStatistics,
+    form: ResponseForm,
+    knots: NDArray,
+    values: NDArray,
+    start: NDArray,
+    fit: Fit,
 ) -> SynthesisResult:
     """Return the filter of fitted coefficients.
 
@@ -150,7 +156,7 @@ def _phases(form: ResponseForm, spline, h: NDArray) -> tuple[NDArray, NDArray]:
 
 
 def _response_row(form: ResponseForm, H: NDArray, a: NDArray, theta: NDArray) -> NDArray[np.float64]:
-    """Return c(h2) with g(h2, h) = c(h2) phi(h): A, and B cos psi, -B sin psi of each pair."""
+    """Return c(h2) with g(h2, h) = c(h2) phi(h): A, and B cos, B sin of psi + pi/4 of each pair."""
     row = np.empty_like(H)
     if form.real:
         row[:, 0] = H[:, 0] * np.exp(-a[:, 0])
@@ -162,7 +168,9 @@ def _response_row(form: ResponseForm, H: NDArray, a: NDArray, theta: NDArray) ->
     return row
 
 
-def _response_coefficients(form: ResponseForm, spline, altitude: NDArray, H: NDArray) -> dict[str, tuple[NDArray, NDArray]]:
+def _response_coefficients(
+    form: ResponseForm, spline, altitude: NDArray, H: NDArray
+) -> dict[str, tuple[NDArray, NDArray]]:
     """Return A, B, psi over the altitude of the response and alpha, omega over that of the impulse, in m."""
     a, theta = _phases(form, spline, altitude / 1000.0)
     row = _response_row(form, H, a, theta) / np.sqrt(1000.0)
@@ -176,7 +184,7 @@ def _response_coefficients(form: ResponseForm, spline, altitude: NDArray, H: NDA
     for p in range(form.pairs):
         i, mark = form.real + 2 * p, "" if p == 0 else f"_{p + 1}"
         found[f"B{mark}"] = (altitude, np.hypot(row[:, i], row[:, i + 1]))
-        found[f"psi{mark}"] = (altitude, np.unwrap(np.arctan2(-row[:, i + 1], row[:, i])) - DRIVE)
+        found[f"psi{mark}"] = (altitude, np.unwrap(np.arctan2(row[:, i + 1], row[:, i])) - DRIVE)
         found[f"alpha_{form.real + p + 1}"] = (altitude[above], a[above, form.real + p] / length)
         found[f"omega{mark}"] = (altitude[above], theta[above, p] / length)
     return found
@@ -205,7 +213,7 @@ def _response_covariance(
 
 
 def _impulse_column(form: ResponseForm, a: NDArray, theta: NDArray) -> NDArray[np.float64]:
-    """Return phi(h): e^a1, and e^a2 cos theta, -e^a2 sin theta of each pair."""
+    """Return phi(h): e^a1, and e^a2 cos(theta - pi/4), -e^a2 sin(theta - pi/4) of each pair."""
     parts = [np.exp(a[:1])] * form.real
     for size, angle in zip(np.exp(a[form.real :]), theta, strict=True):
         parts.append(size * np.array([np.cos(angle - DRIVE), -np.sin(angle - DRIVE)]))

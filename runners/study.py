@@ -12,6 +12,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ..codegen.compiled import ExecutableSystem, executable_system
+from ..model.wind_filter import ShapingFilter
+from ..model.wind_statistics import WindModel
 from ..model.assemble import assemble
 from ..model.errors import DirectNoiseError, ParameterValueError, TimeRangeError, UnknownNameError
 from ..model.library import find_vehicle
@@ -23,6 +25,7 @@ from .integration import IntegratorOptions
 from .mean_response import with_mean_tables
 from .stability import Root, check_coupling, matrices_at, roots, warn_if_unstable
 from .statistics import ResponseStatistics, response_dataset, weighting_dataset
+from .wind_range import warn_beyond
 from .wind_start import covariance_at
 
 Progress = Callable[[float], None]
@@ -105,6 +108,33 @@ class Study:
                 raise ParameterValueError(f"parameter '{name}' cannot be {value:g}; give a finite, sensible number")
             values[names.index(name)] = float(value)
         return Study(self.executable.with_numbers(parameters=values), self.vehicle)
+
+    def with_wind(self, wind: WindModel | ShapingFilter) -> Study:
+        """Return a study of the same vehicle in another wind.
+
+        Parameters
+        ----------
+        wind : WindModel or ShapingFilter
+            A filter alone keeps the vehicle's mean wind.
+
+        Raises
+        ------
+        UnknownNameError
+            If the study has no vehicle.
+
+        Warns
+        -----
+        ExtrapolationWarning
+            The flight leaves the filter's altitudes: its coefficients are held at their last values there.
+        """
+        if self.vehicle is None:
+            raise UnknownNameError("wind of a system of one's own", self.system.name, [])
+        if isinstance(wind, ShapingFilter):
+            wind = WindModel(self.vehicle.wind.mean, wind)
+        warn_beyond(wind.shaping_filter, self.vehicle)
+        study = Study.from_vehicle(replace(self.vehicle, wind=wind), compile=self.executable.library is not None)
+        values = {n: p.value for n, p in self.parameters.items() if n in study.parameters}
+        return study.with_parameters(values)
 
     @cached_property
     def with_means(self) -> ExecutableSystem:

@@ -63,7 +63,9 @@ def synthesise_constrained_response(
         residuals = ca.vertcat(misfit, SMOOTHNESS * smooth, RIDGE * (x - start))
         fit = fit_least_squares(residuals, x, start, options)
     else:
-        groups = np.concatenate([np.repeat(np.arange(form.functions), knots.size), np.full(root.numel(), form.functions)])
+        groups = np.concatenate(
+            [np.repeat(np.arange(form.functions), knots.size), np.full(root.numel(), form.functions)]
+        )
         fit = search_appendix_c(misfit, x, start, groups, options)
     split = knots.size * form.functions
     lower = np.zeros((order, order))

@@ -61,7 +61,13 @@ def synthesise_impulse_response(
 
 
 def _misfit(
-    statistics: WindStatistics, form: ResponseForm, table: ca.SX, first: ca.SX, knots: NDArray, h: NDArray, factor: NDArray
+    statistics: WindStatistics,
+    form: ResponseForm,
+    table: ca.SX,
+    first: ca.SX,
+    knots: NDArray,
+    h: NDArray,
+    factor: NDArray,
 ) -> ca.SX:
     basis = natural_spline(knots, np.eye(knots.size))
     gains = ca.DM(form.gains())

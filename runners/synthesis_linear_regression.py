@@ -46,7 +46,9 @@ def synthesise_linear_regression(
         )
     h = statistics.altitude
     coefficients = {f"a_{i}": (h, a[:, i]) for i in range(order)} | {f"b_{i}": (h, b[:, i]) for i in range(order)}
-    return SynthesisResult(METHOD, statistics, shaping_filter, covariance, True, "regression", coefficients=coefficients)
+    return SynthesisResult(
+        METHOD, statistics, shaping_filter, covariance, True, "regression", coefficients=coefficients
+    )
 
 
 def regression_coefficients(statistics: WindStatistics, order: int) -> tuple[NDArray, NDArray]:

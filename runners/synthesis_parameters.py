@@ -38,7 +38,9 @@ def synthesise_parameters(
     root = np.array([1.0, 0.0, 1.0])
     x, covariance = _symbolic_covariance(statistics)
     upper = np.triu_indices(k)
-    misfit = ca.vertcat(*(covariance[int(i), int(j)] - statistics.covariance[i, j] for i, j in zip(*upper, strict=True)))
+    misfit = ca.vertcat(
+        *(covariance[int(i), int(j)] - statistics.covariance[i, j] for i, j in zip(*upper, strict=True))
+    )
 
     common = ca.SX.sym("common", 4 + 3)
     factors = [ca.DM(first[: 2 * k]) + ca.vertcat(*[common[i] * ca.DM.ones(k) for i in range(2)])]
@@ -65,7 +67,12 @@ def synthesise_parameters(
         f"common factors reached {np.sqrt(2 * together.cost / count):.3g} m2/s2 rms; then {fit.message}",
         together.evaluations + fit.evaluations,
         together.seconds + fit.seconds,
-        {"a_0": (h, np.exp(values[:, 0])), "a_1": (h, np.exp(values[:, 1])), "b_0": (h, values[:, 2]), "b_1": (h, values[:, 3])},
+        {
+            "a_0": (h, np.exp(values[:, 0])),
+            "a_1": (h, np.exp(values[:, 1])),
+            "b_0": (h, values[:, 2]),
+            "b_1": (h, values[:, 3]),
+        },
     )
 
 

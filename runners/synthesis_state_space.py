@@ -141,8 +141,7 @@ def _own_covariance(statistics: WindStatistics, form: _Form, knots: NDArray, val
 def _shaping_filter(statistics: WindStatistics, form: _Form, knots: NDArray, values: NDArray) -> ShapingFilter:
     altitude = dense_samples(statistics.altitude)
     pairs = [
-        form.matrices(v, lambda *s: np.zeros(s), np.exp)
-        for v in natural_spline(knots, values.T)(altitude / 1000.0)
+        form.matrices(v, lambda *s: np.zeros(s), np.exp) for v in natural_spline(knots, values.T)(altitude / 1000.0)
     ]
     H = np.zeros((altitude.size, form.order))
     H[:, 0] = statistics.standard_deviation_table().polynomial(altitude)

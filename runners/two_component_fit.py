@@ -49,7 +49,10 @@ def cross_covariance(
 
 
 def fit_noise_correlation(
-    zonal: ShapingFilter, meridional: ShapingFilter, altitude: NDArray[np.float64], correlation: NDArray[np.float64],
+    zonal: ShapingFilter,
+    meridional: ShapingFilter,
+    altitude: NDArray[np.float64],
+    correlation: NDArray[np.float64],
     deviations: tuple[NDArray[np.float64], NDArray[np.float64]],
 ) -> Table:
     """Return the correlation of the first noises over altitude.

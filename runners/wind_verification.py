@@ -211,8 +211,12 @@ def simulate_profiles(
 
 
 def ensemble_share_inside(
-    shaping_filter: ShapingFilter, covariance: NDArray[np.float64], altitude: NDArray[np.float64], count: int = 5000,
-    seed: int = 504, confidence: float = 0.99,
+    shaping_filter: ShapingFilter,
+    covariance: NDArray[np.float64],
+    altitude: NDArray[np.float64],
+    count: int = 5000,
+    seed: int = 504,
+    confidence: float = 0.99,
 ) -> float:
     """Return the share of covariances that lie inside the interval of an ensemble of simulated profiles."""
     profiles = simulate_profiles(shaping_filter, altitude, count, seed)
