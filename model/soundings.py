@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import datetime
+import itertools
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -45,7 +46,7 @@ class Soundings:
         """Return mean, covariance and cross correlation, with the number of independent samples of each component."""
         k = self.altitude.size
         both = np.hstack([self.u, self.v])
-        correlation = np.corrcoef(both, rowvar=False)
+        correlation = np.asarray(np.corrcoef(both, rowvar=False))
         np.fill_diagonal(correlation, 1.0)
         parts = []
         for component, values, i in (("zonal", self.u, slice(0, k)), ("meridional", self.v, slice(k, 2 * k))):
@@ -72,7 +73,7 @@ def day_to_day_correlation(values: NDArray[np.float64], day: NDArray[np.float64]
     order = np.argsort(day, kind="stable")
     x, d = values[order] - values.mean(axis=0), np.floor(day[order])
     first = [int(np.flatnonzero(d == value)[0]) for value in np.unique(d[np.isfinite(d)])]
-    pairs = [(a, b) for a, b in zip(first[:-1], first[1:], strict=True) if d[b] - d[a] == 1]
+    pairs = [(a, b) for a, b in itertools.pairwise(first) if d[b] - d[a] == 1]
     if len(pairs) < 3:
         return np.full(values.shape[1], np.nan)
     a, b = (x[[p[i] for p in pairs]] for i in (0, 1))

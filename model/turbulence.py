@@ -104,7 +104,7 @@ def turbulence_filter(
         if high_pass is not None:
             corner = 2 * np.pi / high_pass
             F[k, m, :m], F[k, m, m], H[k, m] = corner * C, -corner, -sigma[k]
-    start = solve_continuous_lyapunov(F[0], -G[0] @ G[0].T)
+    start = np.asarray(solve_continuous_lyapunov(F[0], -G[0] @ G[0].T))
     return ShapingFilter(
         f"turbulence_{form.replace('-', '_')}",
         h,
@@ -164,6 +164,12 @@ def add_filters(first: ShapingFilter, second: ShapingFilter, correlation: Table 
     H = np.array([np.concatenate([a[2], b[2]]) for a, b in zip(*values, strict=True)])
     kinks = tuple(sorted({x for f in (first, second) for x in f.kinks if low < x < high}))
     return ShapingFilter(
-        f"{first.name}_and_{second.name}", h, F, G, H,
-        block_diag(first.start_covariance, second.start_covariance), kinks, f"{first.source}; {second.source}",
-    )  # fmt: skip
+        f"{first.name}_and_{second.name}",
+        h,
+        F,
+        G,
+        H,
+        np.asarray(block_diag(first.start_covariance, second.start_covariance)),
+        kinks,
+        f"{first.source}; {second.source}",
+    )

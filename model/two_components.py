@@ -1,8 +1,8 @@
 """Zonal and meridional wind together (report figure 3-1), and the wind in the yaw or pitch plane of a launch.
 
-Both filters keep their own covariance. The meridional filter is driven partly by the noises of the zonal one, so that the
-two winds are correlated at equal levels; which correlation of the noises gives a wanted correlation of the winds depends
-on both filters and is found in runners/two_component_fit.py.
+Both filters keep their own covariance. The meridional filter is driven partly by the noises of the zonal one, so that
+the two winds are correlated at equal levels; which correlation of the noises gives a wanted correlation of the winds
+depends on both filters and is found in runners/two_component_fit.py.
 """
 
 from __future__ import annotations

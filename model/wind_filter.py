@@ -13,7 +13,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-
 from scipy.special import gamma, kv
 
 from .errors import DataError

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 
 import numpy as np
@@ -31,8 +32,7 @@ def knots_for(altitude: NDArray[np.float64]) -> NDArray[np.float64]:
 def divided(altitude: NDArray[np.float64], spacing: float) -> list[NDArray[np.float64]]:
     """Divide each interval between altitudes equally, into steps of at most ``spacing``; one array of edges each."""
     return [
-        np.linspace(a, b, max(1, int(np.ceil((b - a) / spacing - 1e-9))) + 1)
-        for a, b in zip(altitude[:-1], altitude[1:], strict=True)
+        np.linspace(a, b, max(1, int(np.ceil((b - a) / spacing - 1e-9))) + 1) for a, b in itertools.pairwise(altitude)
     ]
 
 
@@ -89,7 +89,7 @@ def propagated_covariance(
         # coefficients are smooth between samples: no step goes across one
         inner = samples[(samples > position) & (samples < target)]
         for edges in divided(np.array([position, *inner, target]), spacing) if target > position else []:
-            for a, b in zip(edges[:-1], edges[1:], strict=True):
+            for a, b in itertools.pairwise(edges):
                 phi, added = transition(matrices, a, b)
                 covariance = phi @ covariance @ phi.T + added
                 columns = [phi @ c for c in columns]

@@ -91,8 +91,9 @@ def fit(
     write_whole(out, lambda p: p.write_text(filter_text(result.shaping_filter), encoding="utf-8"))
     state = "converged" if result.converged else f"NOT converged: {result.message}"
     console.print(
-        f"{method}, order {result.shaping_filter.order}, {state} in {result.seconds:.1f} s: {result.rms_error:.3g} m²/s² "
-        f"rms, {100 * result.share_inside():.1f} % inside the 90 % interval; written to {out}",
+        f"{method}, order {result.shaping_filter.order}, {state} in {result.seconds:.1f} s: "
+        f"{result.rms_error:.3g} m²/s² rms, {100 * result.share_inside():.1f} % inside the 90 % interval; "
+        f"written to {out}",
         soft_wrap=True,
     )
 

@@ -173,7 +173,7 @@ def reconstructed_kernel(period: str, component: str) -> TwoPartKernel:
 def write_kernels(file: Path = WIND_DATA / KERNELS) -> None:
     """Write the knots of all months and components, as shipped in wind_data."""
     lines = [
-        "# computed: knots of the two-part kernel by month and component (runners/correlation_fit.py), fitted to the level",
+        "# computed: knots of the two-part kernel by month and component (runners/correlation_fit.py), fitted to level",
         "# correlations of Cape Canaveral soundings 2008-2022; March by hand; assumed below 1.5 km and above 10.7 km;",
         "# 'third_order' is March zonal with smoothness 0.5, all others have 0.7; scales in m",
         "month,component,quantity,altitude [m],value",

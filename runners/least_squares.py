@@ -128,7 +128,7 @@ def fit_least_squares(residuals: ca.SX, unknowns: ca.SX, start: NDArray[np.float
         found = least_squares(
             evaluate,
             start,
-            jac=lambda x: np.array(jacobian(x)),
+            jac=lambda x: np.array(jacobian(x)),  # pyright: ignore[reportArgumentType]
             method="lm",
             x_scale="jac",
             ftol=options.tolerance,

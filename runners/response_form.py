@@ -8,11 +8,13 @@ may vanish. A first-order mode and a rotating pair need no division:
 
     z1' = -a1' z1 + n,   [z2; z3]' = [-a2' -theta'; theta' -a2'] [z2; z3] + [c; c] n,   W = H(h) z,
 
-c = cos(pi/4), H = [A e^a1, B e^a2 cos(theta + psi + pi/4), B e^a2 sin(theta + psi + pi/4)]; its response to an impulse at h is (3-10). The sign of
-the exponents: a response at h2 to an impulse at h < h2 grows with h, so a1 and a2 increase.
+c = cos(pi/4), H = [A e^a1, B e^a2 cos(theta + psi + pi/4), B e^a2 sin(theta + psi + pi/4)]; its response to an impulse
+at h is (3-10). A response at h2 to an impulse at h < h2 grows with h, so a1 and a2 increase.
 """
 
 from __future__ import annotations
+
+import itertools
 
 import casadi as ca
 import numpy as np
@@ -54,7 +56,7 @@ class ResponseForm:
         decay = np.exp(decay)
         blocks = [-decay[:1].reshape(1, 1)] * self.real
         blocks += [np.array([[-a, -w], [w, -a]]) for a, w in zip(decay[self.real :], turn, strict=True)]
-        return block_diag(*blocks)
+        return np.asarray(block_diag(*blocks))
 
     def step(self, decay: ca.SX, turn: ca.SX) -> ca.SX:
         """Return the transition over which the phases a and theta grow by ``decay`` and ``turn``."""
@@ -96,7 +98,7 @@ def response_result(
     F = np.array([form.state_matrix(spline(x)) for x in h])
     G = form.gains()[:, None]
     P = [start]
-    for a, b in zip(h[:-1], h[1:], strict=True):
+    for a, b in itertools.pairwise(h):
         phi, added = transition(lambda x: (form.state_matrix(spline(x)), G), a, b)
         P.append(phi @ P[-1] @ phi.T + added)
     direction = np.array([form.split(spline(x))[2] for x in h])
@@ -148,7 +150,7 @@ def _phases(form: ResponseForm, spline, h: NDArray) -> tuple[NDArray, NDArray]:
     """Return a (k, modes) and theta (k, pairs), integrals of the rates from the lowest altitude."""
     nodes, weights = np.polynomial.legendre.leggauss(GAUSS_POINTS)
     a, theta = [np.zeros(form.rates)], [np.zeros(form.pairs)]
-    for low, high in zip(h[:-1], h[1:], strict=True):
+    for low, high in itertools.pairwise(h):
         decay, turn, _ = form.split(spline(0.5 * (low + high) + 0.5 * (high - low) * nodes).T)
         a.append(a[-1] + 0.5 * (high - low) * (np.exp(decay) @ weights))
         theta.append(theta[-1] + 0.5 * (high - low) * (turn @ weights))
@@ -198,7 +200,7 @@ def _response_covariance(
     nodes, weights = np.polynomial.legendre.leggauss(GAUSS_POINTS)
     a, theta = _phases(form, spline, h)
     M, moments = start.copy(), [start.copy()]
-    for k, (low, high) in enumerate(zip(h[:-1], h[1:], strict=True)):
+    for k, (low, high) in enumerate(itertools.pairwise(h)):
         for x, weight in zip(0.5 * (low + high) + 0.5 * (high - low) * nodes, weights, strict=True):
             inside_a, inside_theta = _phases(form, spline, np.array([low, x]))
             phi = _impulse_column(form, a[k] + inside_a[1], theta[k] + inside_theta[1])

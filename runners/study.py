@@ -12,14 +12,14 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ..codegen.compiled import ExecutableSystem, executable_system
-from ..model.wind_filter import ShapingFilter
-from ..model.wind_statistics import WindModel
 from ..model.assemble import assemble
 from ..model.errors import DirectNoiseError, ParameterValueError, TimeRangeError, UnknownNameError
 from ..model.library import find_vehicle
 from ..model.system import LinearSystem, Parameter
 from ..model.tables import table_values
 from ..model.vehicle import Vehicle, load_vehicle
+from ..model.wind_filter import ShapingFilter
+from ..model.wind_statistics import WindModel
 from .adjoint import AdjointSolver
 from .integration import IntegratorOptions
 from .mean_response import with_mean_tables

@@ -77,8 +77,8 @@ def synthesise(
     if not result.converged:
         warnings.warn(
             StalledFitWarning(
-                f"{method} for {statistics.name} stopped before it converged ({result.message}); the filter is the best "
-                f"found, with {result.rms_error:.3g} m2/s2 rms"
+                f"{method} for {statistics.name} stopped before it converged ({result.message}); the filter is the "
+                f"best found, with {result.rms_error:.3g} m2/s2 rms"
             ),
             stacklevel=2,
         )

@@ -1,4 +1,4 @@
-"""Constrained response optimisation (report 3.4.4): the coefficients of (3-10) over altitude, fitted to the covariances.
+"""Constrained response optimisation (report 3.4.4): the coefficients of (3-10), fitted to the covariances.
 
 H of the filter (runners/response_form.py) is scaled so that the standard deviation is met at every altitude; rates a1'
 and a2' are kept positive. The states' covariance at the lowest altitude is fitted too: it stands for the response to
@@ -7,6 +7,7 @@ noise below it, and gives the wind its full variance from there up.
 
 from __future__ import annotations
 
+import itertools
 from typing import Literal
 
 import casadi as ca
@@ -97,7 +98,7 @@ def _misfit(
     covariance, deviation = statistics.covariance, statistics.standard_deviation
     for i, edges in enumerate(divided(h, FIT_STEP), start=1):
         phi = ca.SX.eye(n)
-        for a, b in zip(edges[:-1], edges[1:], strict=True):
+        for a, b in itertools.pairwise(edges):
             sides = [form.split(at(0.5 * (a + b) + x * (b - a))) for x in (-GAUSS, GAUSS)]
             rates = [(ca.exp(decay), turn) for decay, turn, _ in sides]
 

@@ -7,6 +7,8 @@ fitted to these averages. The first column stands for what lies below the lowest
 
 from __future__ import annotations
 
+import itertools
+
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +33,7 @@ def average_responses(statistics: WindStatistics) -> NDArray[np.float64]:
         If the covariance is singular.
     """
     try:
-        return np.linalg.cholesky(statistics.covariance)
+        return np.asarray(np.linalg.cholesky(statistics.covariance), float)
     except np.linalg.LinAlgError:
         raise SynthesisError(
             f"the covariance of {statistics.name} is singular, so that average responses do not exist; "
@@ -79,7 +81,7 @@ def _misfit(
     errors = [statistics.standard_deviation[0] * ca.dot(at(h[0])[2], first) - factor[0, 0]]
     for i, edges in enumerate(divided(h, FIT_STEP), start=1):
         phi, average = ca.SX.eye(form.order), ca.SX.zeros(form.order, 1)
-        for a, b in zip(edges[:-1], edges[1:], strict=True):
+        for a, b in itertools.pairwise(edges):
             sides = [at(0.5 * (a + b) + x * (b - a)) for x in (-GAUSS, GAUSS)]
             decay = 0.5 * (b - a) * (ca.exp(sides[0][0]) + ca.exp(sides[1][0]))
             turn = 0.5 * (b - a) * (sides[0][1] + sides[1][1])

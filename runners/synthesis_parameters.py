@@ -7,6 +7,8 @@ The start is the linear regression. Beyond the report the states' covariance at 
 
 from __future__ import annotations
 
+import itertools
+
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
@@ -92,7 +94,7 @@ def _symbolic_covariance(statistics: WindStatistics) -> tuple[ca.SX, ca.SX]:
         if i:
             edges = divided(h[i - 1 : i + 1], FIT_STEP)[0]
             total = ca.SX.eye(2)
-            for low, high in zip(edges[:-1], edges[1:], strict=True):
+            for low, high in itertools.pairwise(edges):
                 share = (0.5 * (low + high) - h[i - 1]) / (h[i] - h[i - 1])
                 middle = (1 - share) * a[i - 1, :] + share * a[i, :]
                 phi, added = _step(middle, high - low)

@@ -9,6 +9,8 @@ fitted. For one noise another rotation leaves two gains and two bands of S, 2 n 
 
 from __future__ import annotations
 
+import itertools
+
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
@@ -106,7 +108,7 @@ def _misfit(statistics: WindStatistics, form: _Form, table: ca.SX, knots: NDArra
     basis = natural_spline(knots, np.eye(knots.size))
     for i, edges in enumerate(divided(h, FIT_STEP), start=1):
         phi = ca.SX.eye(form.order)
-        for a, b in zip(edges[:-1], edges[1:], strict=True):
+        for a, b in itertools.pairwise(edges):
             weights = ca.DM(basis(0.5 * (a + b))).T
             F, _ = form.matrices(ca.vec(weights @ table), ca.SX.zeros, ca.exp)
             term = phi
@@ -131,7 +133,7 @@ def _own_covariance(statistics: WindStatistics, form: _Form, knots: NDArray, val
         return form.matrices(spline(x), lambda *s: np.zeros(s), np.exp)
 
     for i, edges in enumerate(divided(h, 0.05), start=1):
-        for a, b in zip(edges[:-1], edges[1:], strict=True):
+        for a, b in itertools.pairwise(edges):
             columns = transition(matrices, a, b)[0] @ columns
         correlation[i, :i] = correlation[:i, i] = columns[0]
         columns = np.hstack([columns, first])

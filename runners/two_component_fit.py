@@ -8,6 +8,8 @@ grows over the filters' memory.
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
@@ -37,7 +39,7 @@ def cross_covariance(
     found, position = [], low
     for target in levels:
         for edges in divided(np.array([position, target]), STEP) if target > position else []:
-            for a, b in zip(edges[:-1], edges[1:], strict=True):
+            for a, b in itertools.pairwise(edges):
                 d = b - a
                 k1 = rate(a, C)
                 k2 = rate(a + d / 2, C + d / 2 * k1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -96,4 +97,5 @@ def stretched_to_error(shaping_filter: ShapingFilter, statistics: WindStatistics
         raise SynthesisError(
             f"filter '{shaping_filter.name}' cannot be made wrong by {rms:g} m2/s2 rms; choose another error"
         )
-    return stretched(shaping_filter, float(np.exp(brentq(excess, *limits, xtol=1e-4))))
+    root = brentq(excess, *limits, xtol=1e-4, full_output=False)
+    return stretched(shaping_filter, math.exp(float(root)))  # pyright: ignore[reportArgumentType]

@@ -85,9 +85,7 @@ def interval_figure(statistics: WindStatistics, covariance: NDArray[np.float64],
         axes.set_xlabel("altitude, km")
         axes.set_ylabel("covariance, m²/s²")
         axes.legend()
-        axes.set_title(
-            f"Covariance with {h[i]:.3g} km, {statistics.name}, {statistics.independent_samples:.0f} independent samples"
-        )
+        axes.set_title(f"Covariance with {h[i]:.3g} km, {statistics.name}, N = {statistics.independent_samples:.0f}")
     return figure
 
 

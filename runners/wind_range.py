@@ -29,8 +29,8 @@ def warn_beyond(shaping_filter: ShapingFilter, vehicle: Vehicle) -> None:
         parts.append(f"above {high:g} m from {above[0]:.0f} s on")
     warnings.warn(
         ExtrapolationWarning(
-            f"wind filter '{shaping_filter.name}': the flight is {' and '.join(parts)}; coefficients and start covariance "
-            "are held at their last values, so that the wind goes on with the statistics of that end"
+            f"wind filter '{shaping_filter.name}': the flight is {' and '.join(parts)}; coefficients are "
+            "held at their last values, so that the wind goes on with the statistics of that end"
         ),
         stacklevel=3,
     )

@@ -6,6 +6,7 @@ serves the vehicle gives its weighting functions g(h2, h).
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import casadi as ca
@@ -188,7 +189,7 @@ def _steps(shaping_filter: ShapingFilter, altitude: NDArray) -> list[tuple[NDArr
         F, G, _ = shaping_filter.at(h)
         return F, G
 
-    return [transition(matrices, a, b) for a, b in zip(altitude[:-1], altitude[1:], strict=True)]
+    return [transition(matrices, a, b) for a, b in itertools.pairwise(altitude)]
 
 
 def simulate_profiles(

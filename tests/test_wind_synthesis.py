@@ -1,5 +1,6 @@
 """Syntheses of the wind filter, held against the data by the adjoint engine and by an ensemble."""
 
+import itertools
 import warnings
 
 import numpy as np
@@ -15,8 +16,8 @@ from ascentwind.runners.synthesis import synthesise
 from ascentwind.runners.synthesis_impulse_response import average_responses
 from ascentwind.runners.synthesis_result import SynthesisError
 from ascentwind.runners.wind_verification import (
-    ensemble_share_inside,
     engine_covariance,
+    ensemble_share_inside,
     largest_pole,
     simulate_profiles,
     standard_deviation,
@@ -108,7 +109,7 @@ def test_response_coefficients_are_those_of_the_filter():
     f = result.shaping_filter
     between = f.altitude[low_index : high + 1]
     phi = np.eye(f.order)
-    for a, b in zip(between[:-1], between[1:], strict=True):
+    for a, b in itertools.pairwise(between):
         phi = transition(lambda x: f.at(x)[:2], a, b)[0] @ phi
     assert float((f.H[high] @ phi @ f.G[low_index])[0]) == pytest.approx(wanted, rel=1e-6)
 
