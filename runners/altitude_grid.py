@@ -5,12 +5,14 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable
 
+import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline, PPoly
 from scipy.linalg import expm
 
 from ..model.wind_filter import ShapingFilter
+from ..model.wind_statistics import WindStatistics
 
 KNOT_SPACING = 1000.0  # m, least distance of the knots of a coefficient
 SAMPLE_SPACING = 62.5  # m, at most, of the samples of a fitted filter
@@ -51,6 +53,17 @@ def natural_spline(knots: NDArray[np.float64], values: NDArray[np.float64]) -> P
 def second_differences(count: int) -> NDArray[np.float64]:
     """Return the matrix of second differences of values at knots, (count - 2, count)."""
     return np.diff(np.eye(count), 2, axis=0)
+
+
+def covariance_data(statistics: WindStatistics) -> NDArray[np.float64]:
+    """Return standard deviations and covariances as the data of residual functions."""
+    return np.concatenate([statistics.standard_deviation, statistics.covariance.ravel()])
+
+
+def covariance_symbols(count: int) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """Return the symbol of those data, and in it the standard deviations (k,) and covariances (k, k)."""
+    data = ca.SX.sym("data", count + count * count)
+    return data, data[:count], ca.reshape(data[count:], count, count)
 
 
 def transition(matrices: Matrices, low: float, high: float) -> tuple[NDArray, NDArray]:

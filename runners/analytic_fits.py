@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..model.wind_statistics import WindStatistics
-from .least_squares import FitOptions, fit_least_squares
+from .least_squares import FitOptions, fit_least_squares, residual_functions
 
 SPLIT = 10.0  # km: altitudes of reference above it have the second form of correlation
+FAINT = 1e-6
 DEVIATION_START = np.array([5.0, 4.0, -0.1, 11.0, 50.0, 1.5, 1.5])
 
 
@@ -74,8 +75,10 @@ def fit_deviation(altitude: NDArray, deviation: NDArray, options: FitOptions | N
     b = ca.SX.sym("b", 7)
     h = altitude / 1000.0
     residuals = ca.vertcat(*(deviation_form(float(x), b) - y for x, y in zip(h, deviation, strict=True)))
+    # where levels are few they do not determine all seven: a slight pull to the start keeps the rest
+    residuals = ca.vertcat(residuals, FAINT * (b - DEVIATION_START))
     options = options or FitOptions(tolerance=1e-12, max_evaluations=5000)
-    return fit_least_squares(residuals, b, DEVIATION_START, options).unknowns
+    return fit_least_squares(residual_functions(residuals, b), DEVIATION_START, options).unknowns
 
 
 def fit_covariance(statistics: WindStatistics) -> AnalyticCovariance:
@@ -93,7 +96,7 @@ def fit_covariance(statistics: WindStatistics) -> AnalyticCovariance:
             *(form(float(x), b, float(reference)) - r for x, r in zip(h, statistics.correlation[i], strict=True))
         )
         # a slight pull to the start keeps exponents where three terms say the same thing
-        fit = fit_least_squares(ca.vertcat(curve, 1e-4 * (b - start)), b, start, options)
+        fit = fit_least_squares(residual_functions(ca.vertcat(curve, 1e-4 * (b - start)), b), start, options)
         fitted.append(fit.unknowns)
         squares += float(ca.sumsqr(ca.Function("c", [b], [curve])(fit.unknowns)))
     rms = float(np.sqrt(squares / h.size**2))

@@ -84,30 +84,54 @@ class Fit:
     seconds: float
 
 
-def fit_least_squares(residuals: ca.SX, unknowns: ca.SX, start: NDArray[np.float64], options: FitOptions) -> Fit:
-    """Minimise the sum of squares of an expression.
+@dataclass(frozen=True, eq=False)
+class Residuals:
+    """Residuals and their Jacobian as functions of (unknowns, data)."""
+
+    value: ca.Function
+    jacobian: ca.Function
+
+
+def residual_functions(residuals: ca.SX, unknowns: ca.SX, data: ca.SX | None = None) -> Residuals:
+    """Return the functions of an expression; ``data`` are numbers that change from one fit to the next."""
+    residuals = ca.densify(residuals)
+    arguments = [unknowns, ca.SX(0, 1) if data is None else data]
+    return Residuals(
+        ca.Function("residuals", arguments, [residuals]),
+        ca.Function("jacobian", arguments, [ca.jacobian(residuals, unknowns)]),
+    )
+
+
+def fit_least_squares(
+    functions: Residuals, start: NDArray[np.float64], options: FitOptions, data: NDArray[np.float64] | None = None
+) -> Fit:
+    """Minimise the sum of squares.
 
     Parameters
     ----------
-    residuals : SX (m,)
-    unknowns : SX (n,)
+    functions : Residuals
     start : (n,) array
+    data : array, optional
+        For functions that take data.
 
     Raises
     ------
     FitError
-        If the residuals at the start are not finite.
+        Fewer residuals than unknowns, or residuals at the start that are not finite.
     """
-    residuals = ca.densify(residuals)
-    value = ca.Function("residuals", [unknowns], [residuals])
-    jacobian = ca.Function("jacobian", [unknowns], [ca.jacobian(residuals, unknowns)])
+    if functions.value.numel_out(0) < functions.value.numel_in(0):
+        raise FitError(
+            f"{functions.value.numel_in(0)} unknowns cannot follow from {functions.value.numel_out(0)} values; "
+            "give more levels"
+        )
+    given = np.zeros(0) if data is None else data
     begin = time.monotonic()
     best: tuple[float, NDArray] = (np.inf, start)
     evaluations = 0
 
     def evaluate(x: NDArray) -> NDArray:
         nonlocal best, evaluations
-        r = np.array(value(x)).ravel()
+        r = np.array(functions.value(x, given)).ravel()
         evaluations += 1
         usable = np.isfinite(r).all() and np.abs(r).max() < LARGEST
         cost = 0.5 * float(r @ r) if usable else np.inf
@@ -128,7 +152,7 @@ def fit_least_squares(residuals: ca.SX, unknowns: ca.SX, start: NDArray[np.float
         found = least_squares(
             evaluate,
             start,
-            jac=lambda x: np.array(jacobian(x)),  # pyright: ignore[reportArgumentType]
+            jac=lambda x: np.array(functions.jacobian(x, given)),  # pyright: ignore[reportArgumentType]
             method="lm",
             x_scale="jac",
             ftol=options.tolerance,

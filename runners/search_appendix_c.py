@@ -16,7 +16,11 @@ HELD = 0.1  # share of the correction at which it is held after the first succes
 
 
 def search_appendix_c(
-    residuals: ca.SX, unknowns: ca.SX, start: NDArray[np.float64], groups: NDArray[np.int_], options: FitOptions
+    cost_and_gradient: ca.Function,
+    start: NDArray[np.float64],
+    groups: NDArray[np.int_],
+    options: FitOptions,
+    data: NDArray[np.float64],
 ) -> Fit:
     """Descend along a correction vector, one set of coefficients after the other dropping out.
 
@@ -27,18 +31,17 @@ def search_appendix_c(
 
     Parameters
     ----------
+    cost_and_gradient : Function
+        (unknowns, data) -> half the sum of squared errors, gradient.
     groups : (n,) array
         Set of each unknown: A, B, psi, alpha_1, alpha_2, omega.
     """
-    squares = ca.sumsqr(residuals) / 2
-    value = ca.Function("cost", [unknowns], [squares])
-    gradient = ca.Function("gradient", [unknowns], [ca.gradient(squares, unknowns)])
     begin, evaluations = time.monotonic(), 0
 
     def cost(at: NDArray) -> float:
         nonlocal evaluations
         evaluations += 1
-        found = float(value(at))
+        found = float(cost_and_gradient(at, data)[0])
         if options.progress is not None:
             options.progress(evaluations, found)
         return found if np.isfinite(found) else np.inf
@@ -51,7 +54,7 @@ def search_appendix_c(
     converged = False
     while time.monotonic() - begin < options.time_limit:
         before = best
-        partial = np.array(gradient(x)).ravel()
+        partial = np.array(cost_and_gradient(x, data)[1]).ravel()
         remaining = list(np.unique(groups))
         while remaining:
             inside = np.isin(groups, remaining)

@@ -8,6 +8,7 @@ noise below it, and gives the wind its full variance from there up.
 from __future__ import annotations
 
 import itertools
+from functools import lru_cache
 from typing import Literal
 
 import casadi as ca
@@ -16,8 +17,16 @@ from numpy.typing import NDArray
 
 from ..model.errors import UnknownNameError
 from ..model.wind_statistics import WindStatistics
-from .altitude_grid import GAUSS, divided, knots_for, natural_spline, second_differences
-from .least_squares import FitOptions, fit_least_squares
+from .altitude_grid import (
+    GAUSS,
+    covariance_data,
+    covariance_symbols,
+    divided,
+    knots_for,
+    natural_spline,
+    second_differences,
+)
+from .least_squares import FitOptions, Residuals, fit_least_squares, residual_functions
 from .response_form import ResponseForm, response_result
 from .search_appendix_c import search_appendix_c
 from .synthesis_result import SynthesisResult
@@ -52,22 +61,14 @@ def synthesise_constrained_response(
         raise UnknownNameError("search", search, SEARCHES)
     options = options or FitOptions()
     form = ResponseForm(order)
-    h = statistics.altitude / 1000.0
     knots = knots_for(statistics.altitude) / 1000.0
-    table = ca.SX.sym("coefficients", knots.size, form.functions)
-    root = ca.SX.sym("root", order * (order + 1) // 2)
-    x = ca.vertcat(ca.vec(table), root)
-    start = np.concatenate([np.repeat(form.start(), knots.size), np.eye(order)[np.tril_indices(order)] * 1.5])
-    misfit = _misfit(statistics, form, table, root, knots, h)
-    smooth = ca.vec(ca.DM(second_differences(knots.size)) @ table)
+    start = _start(form, knots.size)
+    errors, residuals, groups = _residuals(tuple(statistics.altitude.tolist()), order)
+    data = covariance_data(statistics)
     if search == "least-squares":
-        residuals = ca.vertcat(misfit, SMOOTHNESS * smooth, RIDGE * (x - start))
-        fit = fit_least_squares(residuals, x, start, options)
+        fit = fit_least_squares(residuals, start, options, data)
     else:
-        groups = np.concatenate(
-            [np.repeat(np.arange(form.functions), knots.size), np.full(root.numel(), form.functions)]
-        )
-        fit = search_appendix_c(misfit, x, start, groups, options)
+        fit = search_appendix_c(errors, start, groups, options, data)
     split = knots.size * form.functions
     lower = np.zeros((order, order))
     lower[np.tril_indices(order)] = fit.unknowns[split:]
@@ -75,10 +76,19 @@ def synthesise_constrained_response(
     return response_result(METHOD, statistics, form, knots, values, lower @ lower.T + START_FLOOR * np.eye(order), fit)
 
 
-def _misfit(
-    statistics: WindStatistics, form: ResponseForm, table: ca.SX, root: ca.SX, knots: NDArray, h: NDArray
-) -> ca.SX:
-    """Return the errors of the distinct covariances of different altitudes, m2/s2."""
+def _start(form: ResponseForm, knots: int) -> NDArray[np.float64]:
+    return np.concatenate([np.repeat(form.start(), knots), np.eye(form.order)[np.tril_indices(form.order)] * 1.5])
+
+
+@lru_cache(maxsize=8)
+def _residuals(altitude: tuple[float, ...], order: int) -> tuple[ca.Function, Residuals, NDArray[np.int_]]:
+    """Return the cost with its gradient, the residuals of least squares, and the set of each unknown."""
+    form, levels = ResponseForm(order), np.array(altitude)
+    h, knots = levels / 1000.0, knots_for(levels) / 1000.0
+    table = ca.SX.sym("coefficients", knots.size, form.functions)
+    root = ca.SX.sym("root", order * (order + 1) // 2)
+    x = ca.vertcat(ca.vec(table), root)
+    data, deviation, covariance = covariance_symbols(h.size)
     n, gains = form.order, ca.DM(form.gains())
     lower = ca.SX.zeros(n, n)
     for value, i, j in zip(ca.vertsplit(root), *np.tril_indices(n), strict=True):
@@ -95,7 +105,6 @@ def _misfit(
     P = lower @ lower.T + START_FLOOR * ca.SX.eye(n)
     columns = P @ direction(h[0])
     errors = []
-    covariance, deviation = statistics.covariance, statistics.standard_deviation
     for i, edges in enumerate(divided(h, FIT_STEP), start=1):
         phi = ca.SX.eye(n)
         for a, b in itertools.pairwise(edges):
@@ -115,4 +124,12 @@ def _misfit(
         row = direction(h[i])
         errors += [ca.dot(row, columns[:, j]) * deviation[i] * deviation[j] - covariance[i, j] for j in range(i)]
         columns = ca.horzcat(columns, P @ row)
-    return ca.vertcat(*errors)
+    misfit = ca.vertcat(*errors)
+    smooth = ca.vec(ca.DM(second_differences(knots.size)) @ table)
+    pull = x - _start(form, knots.size)
+    groups = np.concatenate([np.repeat(np.arange(form.functions), knots.size), np.full(root.numel(), form.functions)])
+    return (
+        ca.Function("errors", [x, data], [ca.sumsqr(misfit) / 2, ca.gradient(ca.sumsqr(misfit) / 2, x)]),
+        residual_functions(ca.vertcat(misfit, SMOOTHNESS * smooth, RIDGE * pull), x, data),
+        groups,
+    )

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..model.wind_statistics import WindStatistics
 from .altitude_grid import GAUSS, divided, knots_for, natural_spline, second_differences
-from .least_squares import FitOptions, fit_least_squares
+from .least_squares import FitOptions, fit_least_squares, residual_functions
 from .response_form import ResponseForm, response_result
 from .synthesis_result import SynthesisError, SynthesisResult
 
@@ -55,7 +55,7 @@ def synthesise_impulse_response(
     misfit = _misfit(statistics, form, table, first, knots, h, factor)
     smooth = ca.vec(ca.DM(second_differences(knots.size)) @ table)
     residuals = ca.vertcat(misfit, SMOOTHNESS * smooth, RIDGE * (x - start))
-    fit = fit_least_squares(residuals, x, start, options or FitOptions())
+    fit = fit_least_squares(residual_functions(residuals, x), start, options or FitOptions())
     split = knots.size * form.functions
     values = fit.unknowns[:split].reshape(form.functions, knots.size)
     p = fit.unknowns[split:]

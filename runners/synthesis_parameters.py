@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..model.wind_statistics import WindStatistics
 from .altitude_grid import divided, propagated_covariance
-from .least_squares import FitOptions, fit_least_squares
+from .least_squares import FitOptions, fit_least_squares, residual_functions
 from .synthesis_linear_regression import companion_filter, regression_coefficients
 from .synthesis_result import SynthesisResult
 
@@ -48,12 +48,14 @@ def synthesise_parameters(
     factors = [ca.DM(first[: 2 * k]) + ca.vertcat(*[common[i] * ca.DM.ones(k) for i in range(2)])]
     factors += [ca.vertcat(*[common[2 + i] * ca.DM(first[(2 + i) * k : (3 + i) * k]) for i in range(2)]), common[4:]]
     scaled = ca.substitute(misfit, x, ca.vertcat(*factors))
-    together = fit_least_squares(scaled, common, np.concatenate([[0.0, 0.0, 1.0, 1.0], root]), options)
+    together = fit_least_squares(
+        residual_functions(scaled, common), np.concatenate([[0.0, 0.0, 1.0, 1.0], root]), options
+    )
     start = np.array(ca.Function("start", [common], [ca.vertcat(*factors)])(together.unknowns)).ravel()
 
     difference = np.diff(np.eye(k), 2, axis=0)
     smooth = ca.vec(ca.DM(difference) @ ca.reshape(x[: 4 * k], k, 4))
-    fit = fit_least_squares(ca.vertcat(misfit, SMOOTHNESS * smooth), x, start, options)
+    fit = fit_least_squares(residual_functions(ca.vertcat(misfit, SMOOTHNESS * smooth), x), start, options)
     values = fit.unknowns[: 4 * k].reshape(4, k).T
     lower = np.zeros((2, 2))
     lower[np.tril_indices(2)] = fit.unknowns[4 * k :]

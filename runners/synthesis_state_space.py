@@ -9,7 +9,8 @@ fitted. For one noise another rotation leaves two gains and two bands of S, 2 n 
 
 from __future__ import annotations
 
-import itertools
+from functools import lru_cache
+from itertools import pairwise
 
 import casadi as ca
 import numpy as np
@@ -17,8 +18,17 @@ from numpy.typing import NDArray
 
 from ..model.wind_filter import ShapingFilter
 from ..model.wind_statistics import WindStatistics
-from .altitude_grid import dense_samples, divided, knots_for, natural_spline, second_differences, transition
-from .least_squares import FitOptions, fit_least_squares
+from .altitude_grid import (
+    covariance_data,
+    covariance_symbols,
+    dense_samples,
+    divided,
+    knots_for,
+    natural_spline,
+    second_differences,
+    transition,
+)
+from .least_squares import FitOptions, Residuals, fit_least_squares, residual_functions
 from .synthesis_result import SynthesisError, SynthesisResult
 
 METHOD = "state-space"
@@ -76,15 +86,10 @@ def synthesise_state_space(
     if not 1 <= noises <= order:
         raise SynthesisError(f"a filter of order {order} takes 1 to {order} noises, not {noises}")
     form = _Form(order, noises)
-    h = statistics.altitude / 1000.0
     knots = knots_for(statistics.altitude) / 1000.0
-    x = ca.SX.sym("x", knots.size * form.functions)
-    table = ca.reshape(x, knots.size, form.functions)
-    misfit = _misfit(statistics, form, table, knots, h)
-    smooth = ca.vec(ca.DM(second_differences(knots.size)) @ table)
     start = np.repeat(form.start(), knots.size)
-    residuals = ca.vertcat(misfit, SMOOTHNESS * smooth, RIDGE * (x - start))
-    fit = fit_least_squares(residuals, x, start, options or FitOptions())
+    functions = _residuals(tuple(statistics.altitude.tolist()), order, noises)
+    fit = fit_least_squares(functions, start, options or FitOptions(), covariance_data(statistics))
     values = fit.unknowns.reshape(form.functions, knots.size)
     return SynthesisResult(
         METHOD,
@@ -98,17 +103,21 @@ def synthesise_state_space(
     )
 
 
-def _misfit(statistics: WindStatistics, form: _Form, table: ca.SX, knots: NDArray, h: NDArray) -> ca.SX:
-    """Return the errors of the distinct covariances of different altitudes, m2/s2."""
-    first = ca.SX.zeros(form.order, 1)
+@lru_cache(maxsize=8)
+def _residuals(altitude: tuple[float, ...], order: int, noises: int) -> Residuals:
+    """Return the errors of the distinct covariances, m2/s2, and what chooses among equal fits."""
+    form, levels = _Form(order, noises), np.array(altitude)
+    h, knots = levels / 1000.0, knots_for(levels) / 1000.0
+    x = ca.SX.sym("x", knots.size * form.functions)
+    table = ca.reshape(x, knots.size, form.functions)
+    data, deviation, covariance = covariance_symbols(h.size)
+    first = ca.SX.zeros(order, 1)
     first[0] = 1
     columns, errors = first, []
-    covariance = statistics.covariance
-    deviation = statistics.standard_deviation
     basis = natural_spline(knots, np.eye(knots.size))
     for i, edges in enumerate(divided(h, FIT_STEP), start=1):
-        phi = ca.SX.eye(form.order)
-        for a, b in itertools.pairwise(edges):
+        phi = ca.SX.eye(order)
+        for a, b in pairwise(edges):
             weights = ca.DM(basis(0.5 * (a + b))).T
             F, _ = form.matrices(ca.vec(weights @ table), ca.SX.zeros, ca.exp)
             term = phi
@@ -118,7 +127,9 @@ def _misfit(statistics: WindStatistics, form: _Form, table: ca.SX, knots: NDArra
         columns = phi @ columns
         errors += [columns[0, j] * deviation[i] * deviation[j] - covariance[i, j] for j in range(i)]
         columns = ca.horzcat(columns, first)
-    return ca.vertcat(*errors)
+    smooth = ca.vec(ca.DM(second_differences(knots.size)) @ table)
+    pull = x - np.repeat(form.start(), knots.size)
+    return residual_functions(ca.vertcat(*errors, SMOOTHNESS * smooth, RIDGE * pull), x, data)
 
 
 def _own_covariance(statistics: WindStatistics, form: _Form, knots: NDArray, values: NDArray) -> NDArray[np.float64]:
@@ -133,7 +144,7 @@ def _own_covariance(statistics: WindStatistics, form: _Form, knots: NDArray, val
         return form.matrices(spline(x), lambda *s: np.zeros(s), np.exp)
 
     for i, edges in enumerate(divided(h, 0.05), start=1):
-        for a, b in itertools.pairwise(edges):
+        for a, b in pairwise(edges):
             columns = transition(matrices, a, b)[0] @ columns
         correlation[i, :i] = correlation[:i, i] = columns[0]
         columns = np.hstack([columns, first])

@@ -220,3 +220,16 @@ def test_unstable_filter_is_seen():
     F = np.full((n, 1, 1), 1e-4)
     f = ShapingFilter("unstable", np.arange(n) * 1000.0, F, np.ones((n, 1, 1)), np.ones((n, 1)), np.eye(1))
     assert largest_pole(f) == pytest.approx(1e-4)
+
+
+def test_all_months_and_components_converge_from_the_same_start():
+    from ascentwind.model.range_reference import COMPONENTS, MONTHS
+
+    for period in MONTHS:
+        for component in COMPONENTS:
+            statistics = shipped_statistics(period, component)
+            result = synthesise(statistics)
+            assert result.converged, (period, component)
+            assert result.rms_error <= 1.0, (period, component)
+            assert result.share_inside() == 1.0, (period, component)
+            assert largest_pole(result.shaping_filter) < 0, (period, component)
