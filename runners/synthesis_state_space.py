@@ -9,6 +9,7 @@ fitted. For one noise another rotation leaves two gains and two bands of S, 2 n 
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 from itertools import pairwise
 
@@ -34,7 +35,10 @@ from .synthesis_result import SynthesisError, SynthesisResult
 METHOD = "state-space"
 FIT_STEP = 0.25  # km, of the propagation inside the fit
 SMOOTHNESS, RIDGE = 0.5, 0.1  # m2/s2 a unit of second difference and of value: choose among equal fits
-TAYLOR = 4  # terms of the exponential over a step of the fit
+ENOUGH = 0.004  # rms error over mean variance; above it other starts are drawn, against local minima
+FURTHER_STARTS, SPREAD = 6, 0.5  # a start is shifted by a normal deviate, one a function, 1/km or ln
+TAYLOR = 6  # terms of the exponential over a step of the fit
+LARGEST_GAIN = 3.0  # 1/sqrt(km): keeps decay over a step of the fit near one, where the series holds
 
 
 class _Form:
@@ -57,14 +61,14 @@ class _Form:
 
     def start(self) -> NDArray[np.float64]:
         """Return a value of each function, in 1/km: gains fall and rotations are of the order of 0.3 rad/km."""
-        gains = [np.log(0.4) if p else 0.2 for p in self.positive]
+        gains = [np.log(0.4 / (LARGEST_GAIN - 0.4)) if p else 0.2 for p in self.positive]
         return np.array([*gains, *(0.3 / (j - i) for i, j in self.skew)])
 
     def matrices(self, values, zeros, exp):
         """Return F and G for the values of the functions, symbolic or numeric."""
         G, S = zeros(self.order, self.noises), zeros(self.order, self.order)
         for f, ((i, j), positive) in enumerate(zip(self.gains, self.positive, strict=True)):
-            G[i, j] = exp(values[f]) if positive else values[f]
+            G[i, j] = LARGEST_GAIN / (1 + exp(-values[f])) if positive else values[f]
         for f, (i, j) in enumerate(self.skew, start=len(self.gains)):
             S[i, j], S[j, i] = values[f], -values[f]
         return S - G @ G.T / 2, G
@@ -87,9 +91,20 @@ def synthesise_state_space(
         raise SynthesisError(f"a filter of order {order} takes 1 to {order} noises, not {noises}")
     form = _Form(order, noises)
     knots = knots_for(statistics.altitude) / 1000.0
-    start = np.repeat(form.start(), knots.size)
+    options = options or FitOptions()
     functions = _residuals(tuple(statistics.altitude.tolist()), order, noises)
-    fit = fit_least_squares(functions, start, options or FitOptions(), covariance_data(statistics))
+    data, random = covariance_data(statistics), np.random.default_rng(options.seed)
+    # half the sum of squares at which the root mean square error is a small share of the mean variance
+    enough = 0.5 * statistics.altitude.size**2 / 2 * (ENOUGH * np.mean(statistics.standard_deviation**2)) ** 2
+    fit = fit_least_squares(functions, np.repeat(form.start(), knots.size), options, data)
+    for _ in range(FURTHER_STARTS):
+        left = options.time_limit - fit.seconds
+        if fit.cost < enough or left <= 0:
+            break
+        drawn = np.repeat(form.start() + SPREAD * random.standard_normal(form.functions), knots.size)
+        other = fit_least_squares(functions, drawn, replace(options, time_limit=left), data)
+        best = min(fit, other, key=lambda f: f.cost)
+        fit = replace(best, evaluations=fit.evaluations + other.evaluations, seconds=fit.seconds + other.seconds)
     values = fit.unknowns.reshape(form.functions, knots.size)
     return SynthesisResult(
         METHOD,
