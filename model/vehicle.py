@@ -21,6 +21,7 @@ from .vehicle_file import (
     read_vehicle_file,
 )
 from .wind_filter import TwoPartKernel
+from .wind_filter_file import read_filter
 from .wind_statistics import WindModel, closed_form_filter, report_standard_deviation
 
 VEHICLE_FILE = "vehicle.toml"
@@ -276,6 +277,9 @@ def _load_wind(folder: Path, entry: WindEntry, reader: _Reader) -> WindModel:
     csv = reader.read("wind", entry.statistics, WIND, "altitude", "m")
     h, interpolation = csv.columns["altitude"], entry.statistics.interpolation
     mean = Table("wind.mean", "m/s", h, csv.columns["mean"], interpolation)
+    if entry.correlation is None:
+        assert entry.filter is not None  # WindEntry has one or the other
+        return WindModel(mean, read_filter(folder / entry.filter))
     sigma = csv.columns["standard_deviation"]
     if entry.standard_deviation == "cr103010_fit":
         sigma = report_standard_deviation(h)

@@ -115,7 +115,14 @@ class CorrelationEntry(Section):
 class WindEntry(Section):
     statistics: TableEntry
     standard_deviation: Literal["table", "cr103010_fit"] = "table"
-    correlation: CorrelationEntry
+    correlation: CorrelationEntry | None = None
+    filter: str | None = None
+
+    @model_validator(mode="after")
+    def _one_filter(self):
+        if (self.correlation is None) == (self.filter is None):
+            raise ValueError('needs either [wind.correlation] (closed form) or filter = "FILE" (ascentwind wind fit)')
+        return self
 
 
 class OptionsEntry(Section):

@@ -13,6 +13,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.special import gamma, kv
 
 from .errors import DataError
 from .tables import Table, TableGroup
@@ -121,19 +122,30 @@ def entry_name(matrix: str, row: int, column: int) -> str:
     return f"wind_filter.{matrix}_{row + 1}_{column + 1}"
 
 
+def matern(distance: ArrayLike, smoothness: float) -> NDArray[np.float64]:
+    """Return the Matern correlation of unit scale at distances in scale lengths; smoothness 0.5 is exp(-d)."""
+    d = np.asarray(distance, float)
+    if smoothness == 0.5:
+        return np.exp(-d)
+    x = np.clip(np.sqrt(2 * smoothness) * d, 1e-12, 600.0)
+    return np.where(d > 0, 2 ** (1 - smoothness) / gamma(smoothness) * x**smoothness * kv(smoothness, x), 1.0)
+
+
 @dataclass(frozen=True)
 class TwoPartKernel:
-    """Correlation of the wind between altitudes with an exact third-order filter.
+    """Correlation of the wind between altitudes, positive definite on any set of them.
 
-    rho(h1, h2) = a1 a2 M_1.5(|sL(h1) - sL(h2)|) + b1 b2 M_0.5(|sS(h1) - sS(h2)|), a^2 + b^2 = 1,
+    rho(h1, h2) = a1 a2 M_1.5(|sL(h1) - sL(h2)|) + b1 b2 M_nu(|sS(h1) - sS(h2)|), a^2 + b^2 = 1,
     s(h) = integral of dh / L(h), M the Matern correlation. Knots as (altitudes m, values); scales are
-    log-linear between knots, b^2 is logit-linear, and both are held beyond the last knot.
+    log-linear between knots, b^2 is logit-linear, and both are held beyond the last knot. The smoothness nu of
+    the short part is 0.5 for an exact third-order filter; shears like dh^0.7 at the Cape ask for 0.7.
     """
 
     long_scale: tuple[NDArray[np.float64], NDArray[np.float64]]
     short_scale: tuple[NDArray[np.float64], NDArray[np.float64]]
     short_fraction: tuple[NDArray[np.float64], NDArray[np.float64]]
     source: str = ""
+    short_smoothness: float = 0.5
 
     @property
     def kinks(self) -> tuple[float, ...]:
@@ -161,7 +173,7 @@ class TwoPartKernel:
         r = _SQRT3 * np.abs(warped[0][:, None] - warped[0])
         d = np.abs(warped[1][:, None] - warped[1])
         a, b = np.sqrt(1 - b2), np.sqrt(b2)
-        return np.outer(a, a) * (1 + r) * np.exp(-r) + np.outer(b, b) * np.exp(-d)
+        return np.outer(a, a) * (1 + r) * np.exp(-r) + np.outer(b, b) * matern(d, self.short_smoothness)
 
     def shaping_filter(
         self, altitude: ArrayLike, standard_deviation: ArrayLike, kinks: Sequence[float] = ()
@@ -177,6 +189,11 @@ class TwoPartKernel:
         kinks : sequence of float
             Altitudes where the standard deviation has a corner.
         """
+        if self.short_smoothness != 0.5:
+            raise DataError(
+                f"a kernel of smoothness {self.short_smoothness:g} has no exact filter of third order; "
+                "fit one with synthesise(), or take smoothness 0.5"
+            )
         h, sigma = np.asarray(altitude, float), np.asarray(standard_deviation, float)
         long, short, b2 = self.scales(h)
         F, G, H = np.zeros((h.size, 3, 3)), np.zeros((h.size, 3, 2)), np.zeros((h.size, 3))

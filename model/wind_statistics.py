@@ -1,16 +1,23 @@
-"""Mean and standard deviation of the wind over altitude, and the report's analytic fit of the latter."""
+"""Mean, standard deviation and correlation of the wind over altitude, and the report's fit of the second."""
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .correlation_matrix import RepairWarning, check_correlation, nearest_correlation_matrix
+from .errors import DataError
 from .tables import Table
 from .wind_filter import ShapingFilter, TwoPartKernel
 
 FILTER_SPACING = 250.0  # m, of the samples on which a closed-form filter is tabulated
+REPORT_SAMPLES = 80  # independent soundings behind the report's March statistics, section 3.2
+
+# No climatology of the lowest 40 km comes near these; knots, feet a second or feet read as SI do.
+LARGEST_MEAN, LARGEST_DEVIATION, LARGEST_ALTITUDE, SMALLEST_RANGE = 100.0, 26.0, 40e3, 100.0
 
 
 def report_standard_deviation(altitude: ArrayLike) -> NDArray[np.float64]:
@@ -43,3 +50,208 @@ def closed_form_filter(kernel: TwoPartKernel, standard_deviation: Table, top: fl
     altitude = altitude[keep]
     sigma = standard_deviation.polynomial(np.clip(altitude, knots[0], knots[-1]))
     return kernel.shaping_filter(altitude, sigma, kinks=[x for x in knots if low < x < high])
+
+
+@dataclass(frozen=True, eq=False)
+class WindStatistics:
+    """What is known about one component of the wind at a set of altitudes.
+
+    Parameters
+    ----------
+    name : str
+        Such as 'march zonal'.
+    altitude : (k,) array
+        Increasing, m above mean sea level.
+    mean, standard_deviation : (k,) arrays
+        m/s.
+    correlation : (k, k) array
+        Between altitudes.
+    independent_samples : float
+        Soundings behind the numbers, reduced for their correlation from day to day.
+    source : str
+
+    Raises
+    ------
+    DataError
+        Shapes that disagree, values that no wind has (knots or feet read as SI), an invalid correlation.
+    """
+
+    name: str
+    altitude: NDArray[np.float64]
+    mean: NDArray[np.float64]
+    standard_deviation: NDArray[np.float64]
+    correlation: NDArray[np.float64]
+    independent_samples: float = REPORT_SAMPLES
+    source: str = ""
+
+    def __post_init__(self):
+        for label in ("altitude", "mean", "standard_deviation", "correlation"):
+            object.__setattr__(self, label, np.asarray(getattr(self, label), float))
+        h, k = self.altitude, self.altitude.size
+        if h.ndim != 1 or k < 2:
+            raise DataError(f"wind statistics '{self.name}' need at least two altitudes")
+        for label in ("mean", "standard_deviation"):
+            values = getattr(self, label)
+            if values.shape != (k,):
+                raise DataError(f"wind statistics '{self.name}': {label} has shape {values.shape} for {k} altitudes")
+            if not np.isfinite(values).all():
+                i = int(np.argmin(np.isfinite(values)))
+                raise DataError(
+                    f"wind statistics '{self.name}': {label} at {h[i]:g} m is missing; fill or drop the level"
+                )
+        if not np.isfinite(h).all() or not (np.diff(h) > 0).all():
+            raise DataError(f"wind statistics '{self.name}': altitudes must be finite and increase")
+        _check_plausible(self.name, h, self.mean, self.standard_deviation)
+        if self.correlation.shape != (k, k):
+            raise DataError(f"wind statistics '{self.name}': correlation {self.correlation.shape} for {k} altitudes")
+        check_correlation(self.correlation, f"the correlation of wind statistics '{self.name}'")
+        if not self.independent_samples > 2:
+            raise DataError(f"wind statistics '{self.name}' need more than two independent samples")
+
+    @property
+    def covariance(self) -> NDArray[np.float64]:
+        """Covariance between altitudes, m2/s2, (k, k)."""
+        return self.correlation * np.outer(self.standard_deviation, self.standard_deviation)
+
+    def between(self, low: float, high: float) -> WindStatistics:
+        """Return the levels from ``low`` to ``high`` (m), both included.
+
+        Raises
+        ------
+        DataError
+            If fewer than two levels remain.
+        """
+        i = np.flatnonzero((self.altitude >= low) & (self.altitude <= high))
+        if i.size < 2:
+            raise DataError(
+                f"wind statistics '{self.name}' hold {i.size} levels between {low:g} and {high:g} m; they cover "
+                f"{self.altitude[0]:g} to {self.altitude[-1]:g} m"
+            )
+        return WindStatistics(
+            self.name,
+            self.altitude[i],
+            self.mean[i],
+            self.standard_deviation[i],
+            self.correlation[np.ix_(i, i)],
+            self.independent_samples,
+            self.source,
+        )
+
+    def mean_table(self) -> Table:
+        """Return the mean over altitude, monotone cubic between the levels."""
+        return Table("wind.mean", "m/s", self.altitude, self.mean, "pchip")
+
+    def standard_deviation_table(self) -> Table:
+        """Return the standard deviation over altitude, monotone cubic between the levels."""
+        return Table("wind.standard_deviation", "m/s", self.altitude, self.standard_deviation, "pchip")
+
+
+def statistics_from_covariance(
+    name: str,
+    altitude: ArrayLike,
+    mean: ArrayLike,
+    covariance: ArrayLike,
+    independent_samples: float = REPORT_SAMPLES,
+    source: str = "given as a matrix",
+    repair: bool = False,
+) -> WindStatistics:
+    """Return statistics from a covariance matrix of one's own.
+
+    Parameters
+    ----------
+    altitude : (k,) array
+        m.
+    mean : (k,) array
+        m/s.
+    covariance : (k, k) array
+        m2/s2.
+    repair : bool
+        Replace correlations that no wind can have by the nearest valid ones; a RepairWarning says what changed.
+
+    Raises
+    ------
+    NotPositiveSemidefiniteError
+        Without ``repair``, if the matrix has a negative eigenvalue.
+    """
+    matrix = np.asarray(covariance, float)
+    if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1]:
+        raise DataError(f"the covariance of '{name}' has shape {matrix.shape}; give a square matrix")
+    variance = np.diag(matrix)
+    if not np.isfinite(matrix).all() or (variance <= 0).any():
+        i = int(np.argmax(~np.isfinite(matrix).all(axis=1) | ~(variance > 0)))
+        raise DataError(
+            f"the covariance of '{name}' has a variance or entry in row {i} that is not finite and positive"
+        )
+    sigma = np.sqrt(variance)
+    correlation = matrix / np.outer(sigma, sigma)
+    np.fill_diagonal(correlation, 1.0)
+    if repair:
+        repaired = nearest_correlation_matrix(correlation)
+        if repaired.largest_change > 1e-9:
+            warnings.warn(RepairWarning(f"wind statistics '{name}': {repaired}"), stacklevel=2)
+            correlation, source = repaired.matrix, f"{source}; {repaired}"
+    return WindStatistics(
+        name, np.asarray(altitude, float), np.asarray(mean, float), sigma, correlation, independent_samples, source
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class TwoComponentStatistics:
+    """Zonal (towards the east) and meridional (towards the north) wind and their correlation.
+
+    Parameters
+    ----------
+    zonal, meridional : WindStatistics
+        At the same altitudes.
+    intralevel_correlation : (k,) array
+        Of u and v at the same altitude.
+    cross_correlation : (k, k) array, optional
+        Of u at the altitude of the row with v at that of the column, where it is known.
+    """
+
+    zonal: WindStatistics
+    meridional: WindStatistics
+    intralevel_correlation: NDArray[np.float64]
+    cross_correlation: NDArray[np.float64] | None = None
+
+    def __post_init__(self):
+        h, r = self.zonal.altitude, np.asarray(self.intralevel_correlation, float)
+        if not np.array_equal(h, self.meridional.altitude) or r.shape != h.shape:
+            raise DataError("zonal and meridional wind and their correlation must be given at the same altitudes")
+        if not (np.abs(r) <= 1).all():
+            raise DataError("a correlation of zonal and meridional wind is not between -1 and 1")
+        if self.cross_correlation is not None:
+            x = self.cross_correlation
+            if x.shape != (h.size, h.size) or not np.allclose(np.diag(x), r, atol=1e-6):
+                raise DataError("the cross correlation must be square with the intralevel correlation on its diagonal")
+            check_correlation(
+                np.block([[self.zonal.correlation, x], [x.T, self.meridional.correlation]]),
+                "the joint correlation of zonal and meridional wind",
+            )
+
+
+def _check_plausible(name: str, altitude: NDArray, mean: NDArray, deviation: NDArray) -> None:
+    where = f"wind statistics '{name}'"
+    if altitude[0] < -500 or altitude[-1] > LARGEST_ALTITUDE:
+        raise DataError(
+            f"{where} run from {altitude[0]:g} to {altitude[-1]:g} m; are these feet? Convert them to metres"
+        )
+    if altitude[-1] - altitude[0] < SMALLEST_RANGE:
+        raise DataError(
+            f"{where} span only {altitude[-1] - altitude[0]:g} m; are these kilometres? Convert them to metres"
+        )
+    if (deviation <= 0).any():
+        i = int(np.argmin(deviation))
+        raise DataError(
+            f"{where}: the standard deviation at {altitude[i]:g} m is {deviation[i]:g}; it must be positive"
+        )
+    for label, values, limit in (
+        ("mean", np.abs(mean), LARGEST_MEAN),
+        ("standard deviation", deviation, LARGEST_DEVIATION),
+    ):
+        if (values > limit).any():
+            i = int(np.argmax(values))
+            raise DataError(
+                f"{where}: a {label} of {values[i]:g} m/s at {altitude[i]:g} m is more than any wind has; "
+                "are these knots or feet a second? Convert them to m/s"
+            )

@@ -15,6 +15,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn
 from rich.table import Table
 
 from ..model.errors import AscentwindError, AscentwindWarning
+from .cli_wind import app as wind_app
 
 app = typer.Typer(
     add_completion=False,
@@ -22,6 +23,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     help="Response statistics of ascending launch vehicles in a random wind, by the method of adjoint systems.",
 )
+app.add_typer(wind_app, name="wind")
 console = Console()
 errors = Console(stderr=True)
 

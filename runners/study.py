@@ -18,6 +18,8 @@ from ..model.library import find_vehicle
 from ..model.system import LinearSystem, Parameter
 from ..model.tables import table_values
 from ..model.vehicle import Vehicle, load_vehicle
+from ..model.wind_filter import ShapingFilter
+from ..model.wind_statistics import WindModel
 from .adjoint import AdjointSolver
 from .engines import Progress, batch_dataset, compute_statistics
 from .integration import IntegratorOptions
@@ -25,6 +27,7 @@ from .mean_response import with_mean_tables
 from .stability import Root, check_coupling, matrices_at, roots, warn_if_unstable
 from .statistics import ResponseStatistics, weighting_dataset, weighting_family
 from .sweep_engine import SweepOptions, batch, sweep, sweep_of, with_sweep_mean_tables
+from .wind_range import warn_beyond
 from .wind_start import covariance_at
 
 POSITIVE = ("correlation_time", "reference_area")
@@ -109,6 +112,33 @@ class Study:
                 raise ParameterValueError(f"parameter '{name}' cannot be {value:g}; give a finite, sensible number")
             values[names.index(name)] = float(value)
         return values
+
+    def with_wind(self, wind: WindModel | ShapingFilter) -> Study:
+        """Return a study of the same vehicle in another wind.
+
+        Parameters
+        ----------
+        wind : WindModel or ShapingFilter
+            A filter alone keeps the vehicle's mean wind.
+
+        Raises
+        ------
+        UnknownNameError
+            If the study has no vehicle.
+
+        Warns
+        -----
+        ExtrapolationWarning
+            The flight leaves the filter's altitudes: its coefficients are held at their last values there.
+        """
+        if self.vehicle is None:
+            raise UnknownNameError("wind of a system of one's own", self.system.name, [])
+        if isinstance(wind, ShapingFilter):
+            wind = WindModel(self.vehicle.wind.mean, wind)
+        warn_beyond(wind.shaping_filter, self.vehicle)
+        study = Study.from_vehicle(replace(self.vehicle, wind=wind), compile=self.executable.library is not None)
+        values = {n: p.value for n, p in self.parameters.items() if n in study.parameters}
+        return study.with_parameters(values)
 
     @cached_property
     def with_means(self) -> ExecutableSystem:

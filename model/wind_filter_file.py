@@ -1,0 +1,48 @@
+"""Shaping filters in files: JSON with the altitude samples, the three matrices and the start covariance."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from .errors import DataError
+from .wind_filter import ShapingFilter
+
+FORMAT = 1
+KEYS = ("altitude_m", "F_per_m", "G_per_root_m", "H_m_per_s", "start_covariance", "kinks_m")
+
+
+def filter_text(shaping_filter: ShapingFilter) -> str:
+    """Return a filter as JSON; numbers keep all their digits."""
+    f = shaping_filter
+    arrays = (f.altitude, f.F, f.G, f.H, f.start_covariance, np.array(f.kinks))
+    head = {"format": FORMAT, "name": f.name, "source": f.source}
+    lines = [f"  {json.dumps(k)}: {json.dumps(v)}" for k, v in head.items()]
+    lines += [f"  {json.dumps(k)}: {json.dumps(a.tolist())}" for k, a in zip(KEYS, arrays, strict=True)]
+    return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+def read_filter(file: Path) -> ShapingFilter:
+    """Read a filter.
+
+    Raises
+    ------
+    DataError
+        The file and what is wrong with it.
+    """
+    try:
+        data = json.loads(file.read_text(encoding="utf-8"))
+        if data.get("format") != FORMAT:
+            raise DataError(f"has format {data.get('format')!r}; this version reads {FORMAT}", file=file)
+        altitude, F, G, H, start, kinks = (np.array(data[k], float) for k in KEYS)
+        return ShapingFilter(str(data["name"]), altitude, F, G, H, start, tuple(kinks.tolist()), str(data["source"]))
+    except OSError as error:
+        raise DataError(f"cannot be read ({error.strerror or error})", file=file) from None
+    except KeyError as error:
+        raise DataError(f"lacks {error}; write filters with 'ascentwind wind fit'", file=file) from None
+    except (ValueError, TypeError, AttributeError, IndexError) as error:
+        raise DataError(f"is not a wind filter: {error}", file=file) from None
+    except DataError as error:
+        raise DataError(error.why, file=file) from None

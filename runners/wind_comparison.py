@@ -1,0 +1,101 @@
+"""Response variances under different winds (report section 5.1, figure 5-2)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import brentq
+
+from ..model.range_reference import interlevel_kernel, shipped_statistics
+from ..model.wind_filter import ShapingFilter
+from ..model.wind_statistics import WindModel, WindStatistics, closed_form_filter
+from .altitude_grid import propagated_covariance
+from .study import Study
+from .synthesis import synthesise
+from .synthesis_result import SynthesisError
+
+TOP = 20000.0  # m, of the fitted filters of a comparison
+REPORT_ERRORS = (14.0, 14.0 * np.sqrt(2.0))  # m2/s2 rms: the report's filter, and one of twice the mean squared error
+LARGEST_STRETCH = 50.0
+
+
+@dataclass(frozen=True)
+class WindResponse:
+    """Mean and standard deviation of a response, from wind alone, under one wind."""
+
+    wind: str
+    mean: float
+    deviation: float
+
+
+def compare_winds(
+    study: Study, winds: Mapping[str, WindModel | ShapingFilter], time: float, response: str = "bending_moment"
+) -> list[WindResponse]:
+    """Return a response at an end time (s) under the study's own wind, then each of the others."""
+    found = []
+    for name, wind in {"as in the vehicle": None, **winds}.items():
+        case = study if wind is None else study.with_wind(wind)
+        part = case.response_statistics([time], responses=[response]).sel(response=response, source="wind", time=time)
+        found.append(WindResponse(name, float(part["mean"]), float(part["std"])))
+    return found
+
+
+def shipped_winds() -> dict[str, WindModel]:
+    """Return the winds of the report's comparison: March, February and annual, and March of the other edition."""
+    cases = {
+        "march": ("march", "1983"),
+        "february": ("february", "1983"),
+        "annual": ("annual", "1983"),
+        "march 2006": ("march", "2006"),
+    }
+    winds = {}
+    for name, (period, edition) in cases.items():
+        statistics = shipped_statistics(period, edition=edition, top=TOP)
+        winds[f"{name}, fitted"] = WindModel(statistics.mean_table(), synthesise(statistics).shaping_filter)
+    exact = shipped_statistics(top=TOP, third_order=True)
+    closed = closed_form_filter(interlevel_kernel("march", "zonal", True), exact.standard_deviation_table())
+    winds["march, closed form"] = WindModel(exact.mean_table(), closed)
+    return winds
+
+
+def stretched(shaping_filter: ShapingFilter, factor: float) -> ShapingFilter:
+    """Return a filter that runs faster over altitude by a factor: the same variances, shorter correlations."""
+    f = shaping_filter
+    return ShapingFilter(
+        f"{f.name}_stretched",
+        f.altitude,
+        factor * f.F,
+        np.sqrt(factor) * f.G,
+        f.H,
+        f.start_covariance,
+        f.kinks,
+        f.source,
+    )
+
+
+def stretched_to_error(shaping_filter: ShapingFilter, statistics: WindStatistics, rms: float) -> ShapingFilter:
+    """Return the filter made poorer, by shorter correlations, until its covariances are wrong by ``rms`` (m2/s2).
+
+    Raises
+    ------
+    SynthesisError
+        An error smaller than the filter's own, or larger than shortening can give.
+    """
+    upper = np.triu_indices(statistics.altitude.size)
+
+    def excess(logarithm: float) -> float:
+        covariance = propagated_covariance(
+            stretched(shaping_filter, float(np.exp(logarithm))), statistics.altitude, 250.0
+        )
+        return float(np.sqrt(np.mean((covariance - statistics.covariance)[upper] ** 2))) - rms
+
+    limits = (0.0, float(np.log(LARGEST_STRETCH)))
+    if excess(limits[0]) > 0 or excess(limits[1]) < 0:
+        raise SynthesisError(
+            f"filter '{shaping_filter.name}' cannot be made wrong by {rms:g} m2/s2 rms; choose another error"
+        )
+    root = brentq(excess, *limits, xtol=1e-4, full_output=False)
+    return stretched(shaping_filter, math.exp(float(root)))  # pyright: ignore[reportArgumentType]

@@ -1,0 +1,271 @@
+"""Turbulence, two components, flight time, filter files, the vehicle's wind and the command line."""
+
+import warnings
+
+import numpy as np
+import pytest
+import sympy as sp
+from ascentwind.model.errors import DataError, ExtrapolationWarning, UnknownNameError
+from ascentwind.model.range_reference import shipped_statistics, shipped_two_components
+from ascentwind.model.tables import Table
+from ascentwind.model.turbulence import (
+    FORMS,
+    LENGTH,
+    add_filters,
+    transverse_spectrum,
+    turbulence_filter,
+    turbulence_intensity,
+)
+from ascentwind.model.two_components import plane_weights, wind_in_plane
+from ascentwind.model.wind_filter_file import filter_text, read_filter
+from ascentwind.model.wind_statistics import WindModel
+from ascentwind.runners.altitude_grid import propagated_covariance
+from ascentwind.runners.cli import app
+from ascentwind.runners.synthesis import synthesise
+from ascentwind.runners.synthesis_linear_regression import FIRST_2, FIRST_3, SECOND_2, SECOND_3, THIRD_3
+from ascentwind.runners.two_component_fit import cross_covariance, fit_noise_correlation
+from ascentwind.runners.wind_comparison import stretched_to_error
+from ascentwind.runners.wind_verification import simulate_profiles, standard_deviation
+from typer.testing import CliRunner
+
+
+@pytest.fixture(scope="module")
+def march():
+    statistics = shipped_statistics()
+    return synthesise(statistics).shaping_filter, statistics
+
+
+def spectrum(shaping_filter, altitude: float, wave_number: float) -> float:
+    F, G, H = shaping_filter.at(altitude)
+    response = H @ np.linalg.solve(1j * wave_number * np.eye(len(F)) - F, G[:, 0])
+    return float(np.abs(response) ** 2 / np.pi)
+
+
+@pytest.mark.parametrize(("form", "factor"), [("dryden", 1.0001), ("von-karman-2", 1.6), ("von-karman-3", 1.09)])
+def test_turbulence_spectrum_to_twenty_radians_a_second(form, factor):
+    shaping_filter = turbulence_filter(form)
+    sigma = float(turbulence_intensity().polynomial(9000.0))
+    # 20 rad/s at 500 m/s
+    for wave_number in np.geomspace(0.1 / LENGTH, 20 / 500, 12):
+        wanted = transverse_spectrum(form[:10] if form.startswith("von") else form, wave_number, sigma, LENGTH)
+        assert 1 / factor < spectrum(shaping_filter, 9000.0, wave_number) / wanted < factor
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_turbulence_has_its_intensity_from_the_ground_up(form):
+    shaping_filter = turbulence_filter(form, "severe")
+    sigma = turbulence_intensity("severe").polynomial(np.clip(shaping_filter.altitude, 152.0, 24384.0))
+    # the rational von Karman forms hold 0.962 to 1.034 of the variance
+    assert standard_deviation(shaping_filter) == pytest.approx(sigma, rel=0.025)
+
+
+def test_high_pass_takes_out_what_the_soundings_hold():
+    whole, above = turbulence_filter(), turbulence_filter(high_pass=2000.0)
+    low, high = 2 * np.pi / 50000, 2 * np.pi / 50
+    assert spectrum(above, 5000.0, low) < 0.01 * spectrum(whole, 5000.0, low)
+    assert spectrum(above, 5000.0, high) == pytest.approx(spectrum(whole, 5000.0, high), rel=0.01)
+
+
+def test_sum_of_filters_adds_variances_and_correlates_on_request(march):
+    large, _ = march
+    small = turbulence_filter(altitude=(0.0, 20000.0))
+    h = np.array([5000.0, 10000.0])
+    both = propagated_covariance(add_filters(large, small), h)
+    parts = [propagated_covariance(f, h) for f in (large, small)]
+    assert both == pytest.approx(parts[0] + parts[1], rel=1e-3)
+    r = Table("r", "1", np.array([0.0, 20000.0]), np.array([0.5, 0.5]), "linear")
+    assert propagated_covariance(add_filters(large, small, r), h)[0, 0] > both[0, 0]
+    with pytest.raises(DataError, match="share no altitudes"):
+        add_filters(large, turbulence_filter(altitude=(17000.0, 20000.0)))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "says"),
+    [
+        ({"form": "dryen"}, UnknownNameError, "dryden"),
+        ({"severity": "sever"}, UnknownNameError, "severe"),
+        ({"altitude": (5000.0, 0.0)}, DataError, "range"),
+        ({"high_pass": 0.0}, DataError, "high pass"),
+        ({"length": -1.0}, DataError, "positive"),
+    ],
+)
+def test_bad_turbulence(arguments, error, says):
+    with pytest.raises(error, match=says):
+        turbulence_filter(**arguments)
+
+
+def test_two_components_have_the_intralevel_correlation():
+    both = shipped_two_components()
+    filters = [synthesise(s).shaping_filter for s in (both.zonal, both.meridional)]
+    deviations = (both.zonal.standard_deviation, both.meridional.standard_deviation)
+    h = both.zonal.altitude
+    r = fit_noise_correlation(*filters, h, both.intralevel_correlation, deviations)
+    found = cross_covariance(*filters, r, h) / (deviations[0] * deviations[1])
+    # the start covariances are independent, so the surface stays at zero; 80 samples give +-.18
+    assert found[3:] == pytest.approx(both.intralevel_correlation[3:], abs=0.12)
+    # a second road: the two as one filter, simulated
+    joint = add_filters(*filters, r)
+    u, v = (_seen(joint, range(i, i + 3)) for i in (0, 3))
+    levels = h[[5, 12]]
+    a, b = (simulate_profiles(f, levels, 20000, seed=7) for f in (u, v))
+    assert np.mean(a * b, axis=0) / (deviations[0] * deviations[1])[[5, 12]] == pytest.approx(found[[5, 12]], abs=0.03)
+
+
+def _seen(joint, states):
+    from dataclasses import replace
+
+    H = np.zeros_like(joint.H)
+    H[:, list(states)] = joint.H[:, list(states)]
+    return replace(joint, H=H)
+
+
+def test_wind_in_the_plane_of_a_launch():
+    assert plane_weights(np.pi / 2, "pitch") == pytest.approx((1.0, 0.0))
+    assert plane_weights(np.radians(72.0), "yaw") == pytest.approx((0.30902, -0.95106), abs=1e-5)
+    both = shipped_two_components("march", top=6000.0)
+    winds = [WindModel(s.mean_table(), synthesise(s, order=2).shaping_filter) for s in (both.zonal, both.meridional)]
+    yaw = wind_in_plane(winds[0], winds[1], np.radians(72.0), "yaw")
+    c, s = np.cos(np.radians(72.0)), np.sin(np.radians(72.0))
+    assert yaw.mean.values[-1] == pytest.approx(c * both.zonal.mean[-1] - s * both.meridional.mean[-1])
+    h = both.zonal.altitude
+    wanted = c**2 * both.zonal.standard_deviation**2 + s**2 * both.meridional.standard_deviation**2
+    assert np.diag(propagated_covariance(yaw.shaping_filter, h)) == pytest.approx(wanted, rel=1e-3)
+    with pytest.raises(DataError, match="degrees"):
+        plane_weights(72.0, "yaw")
+    with pytest.raises(UnknownNameError, match="yaw"):
+        plane_weights(1.0, "yew")
+
+
+def test_flight_time_gives_the_variance_of_altitude(march):
+    """Appendix E along a trajectory of changing climb rate: z' = hdot F z + sqrt(hdot) G n."""
+    from scipy.integrate import solve_ivp
+
+    shaping_filter, statistics = march
+    h = statistics.altitude
+
+    def climb(t: float) -> tuple[float, float]:
+        return 3.0 + 5.0 * t + 1.2 * t * t, 5.0 + 2.4 * t
+
+    def rate(t: float, p: np.ndarray) -> np.ndarray:
+        altitude, speed = climb(t)
+        F, G, _ = shaping_filter.at(altitude)
+        P = p.reshape(3, 3)
+        return (speed * (F @ P + P @ F.T) + np.sqrt(speed) ** 2 * G @ G.T).ravel()
+
+    end = 80.0
+    P = solve_ivp(rate, (0, end), 0.3 * shaping_filter.start_covariance.ravel(), rtol=1e-9, atol=1e-12).y[:, -1]
+    H = shaping_filter.at(climb(end)[0])[2]
+    from dataclasses import replace
+
+    weaker = replace(shaping_filter, start_covariance=0.3 * shaping_filter.start_covariance)
+    in_altitude = propagated_covariance(weaker, np.array([h[0], climb(end)[0]]))[1, 1]
+    assert H @ P.reshape(3, 3) @ H == pytest.approx(in_altitude, rel=1e-6)
+
+
+def test_appendix_d_derived_again():
+    """D-10 is right; D-8 as printed is not the derivative."""
+    h, psi, B = sp.symbols("h psi B")
+    alpha, omega = sp.Function("alpha")(h), sp.Function("omega")(h)
+    g = B * sp.exp(alpha * h) * sp.cos(omega * h + psi)
+    p, q = sp.diff(alpha * h, h), sp.diff(omega * h, h)
+    bend, turn = 2 * sp.diff(alpha, h) + sp.diff(alpha, h, 2) * h, 2 * sp.diff(omega, h) + sp.diff(omega, h, 2) * h
+    # D-10, coefficients of g and of its derivative
+    a2 = 2 * p + turn / q
+    a3 = bend - q**2 - p**2 - turn / q * p
+    residual = sp.simplify((sp.diff(g, h, 2) - a2 * sp.diff(g, h) - a3 * g) / g)
+    assert residual == 0
+    # D-8 as printed: omega + omega' in the place of omega + omega' h in its fourth term
+    cosine, sine = B * sp.exp(alpha * h) * sp.cos(omega * h + psi), B * sp.exp(alpha * h) * sp.sin(omega * h + psi)
+
+    def d8(fourth):
+        return (p**2 + bend - q**2) * cosine - (p * q + p * fourth + turn) * sine
+
+    assert sp.simplify(sp.diff(g, h, 2) - d8(q)) == 0
+    assert sp.simplify(sp.diff(g, h, 2) - d8(omega + sp.diff(omega, h))) != 0
+
+
+def test_appendix_b_formulas_are_exact_for_polynomials():
+    """(B-8) to (B-22) on powers of the point; the printed forms differ only where noted in docs/wind.md."""
+    for points, tables in ((3, (FIRST_2, SECOND_2)), (4, (FIRST_3, SECOND_3, THIRD_3))):
+        x = np.arange(points)
+        for order, table in enumerate(tables, start=1):
+            for power in range(3 if points == 3 or order == 1 else 4):
+                wanted = np.polyval(np.polyder([1] + [0] * power, order), x)
+                if power < 3 or order > 1:
+                    assert table @ x**power == pytest.approx(wanted), (points, order, power)
+
+
+def test_filters_survive_their_file(tmp_path, march):
+    shaping_filter, _ = march
+    file = tmp_path / "filter.json"
+    file.write_text(filter_text(shaping_filter))
+    again = read_filter(file)
+    for name in ("altitude", "F", "G", "H", "start_covariance"):
+        assert np.array_equal(getattr(again, name), getattr(shaping_filter, name))
+    for text, says in (("{", "not a wind filter"), ('{"format": 2}', "format"), ('{"format": 1}', "lacks")):
+        file.write_text(text)
+        with pytest.raises(DataError, match=says):
+            read_filter(file)
+    with pytest.raises(DataError, match="cannot be read"):
+        read_filter(tmp_path / "none.json")
+
+
+def test_fitted_filter_moves_the_bending_variance_by_less_than_one_percent(as504):
+    """Against the closed form it was fitted to, which the shipped vehicle has."""
+    statistics = shipped_statistics(top=30000.0, third_order=True)
+    with pytest.warns(ExtrapolationWarning, match="30000 m"):
+        fitted = as504.with_wind(synthesise(statistics).shaping_filter)
+    one, other = (
+        float(s.response_statistics([75.0]).variance.sel(response="bending_moment", source="wind", time=75.0))
+        for s in (as504, fitted)
+    )
+    assert other == pytest.approx(one, rel=0.01)
+    assert other != one
+
+
+def test_a_flight_above_the_filter_is_told(as504, march):
+    shaping_filter, _ = march
+    with pytest.warns(ExtrapolationWarning, match="16000 m"):
+        as504.with_wind(shaping_filter)
+
+
+def test_vehicle_takes_a_filter_file(vehicle_folder, march):
+    from ascentwind.model.vehicle import load_vehicle
+
+    shaping_filter, _ = march
+    (vehicle_folder / "filter.json").write_text(filter_text(shaping_filter))
+    toml = vehicle_folder / "vehicle.toml"
+    text = toml.read_text()
+    before, _, after = text.partition("[wind.correlation]")
+    after = after[after.index("\n[") :]
+    with_filter = before.replace("[wind]\n", '[wind]\nfilter = "filter.json"\n') + after
+    toml.write_text(with_filter)
+    assert np.array_equal(load_vehicle(vehicle_folder).wind.shaping_filter.F, shaping_filter.F)
+    toml.write_text(with_filter.replace('filter = "filter.json"\n', ""))
+    with pytest.raises(DataError, match="either"):
+        load_vehicle(vehicle_folder)
+
+
+def test_poorer_filters_are_as_wrong_as_asked(march):
+    shaping_filter, statistics = march
+    poorer = stretched_to_error(shaping_filter, statistics, 14.0)
+    error = propagated_covariance(poorer, statistics.altitude) - statistics.covariance
+    assert np.sqrt(np.mean(error[np.triu_indices(len(error))] ** 2)) == pytest.approx(14.0, rel=0.01)
+    assert np.diag(error) == pytest.approx(0, abs=1e-3)
+
+
+def test_command_line(tmp_path):
+    runner = CliRunner()
+    file = tmp_path / "f.json"
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        fit = runner.invoke(app, ["wind", "fit", "--top", "6000", "--order", "2", "--out", str(file)])
+    assert fit.exit_code == 0, fit.output
+    assert "converged" in fit.output
+    check = runner.invoke(app, ["wind", "check", str(file), "--top", "6000", "--profiles", "500"])
+    assert "100.0 %" in check.output
+    stats = runner.invoke(app, ["wind", "stats", "--component", "meridional"])
+    assert "14.05" in stats.output  # v at 11 km, RCC 361-83
+    plot = runner.invoke(app, ["wind", "plot", str(file), "--top", "6000", "--out", str(tmp_path / "figures")])
+    assert plot.exit_code == 0, plot.output
+    assert len(list((tmp_path / "figures").iterdir())) == 8
