@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..codegen.compiled import ExecutableSystem
 from ..codegen.sweep import CompiledSweep, Segments, compiled_sweep
-from ..model.errors import DirectNoiseError, IntegrationError, TimeRangeError
+from ..model.errors import IntegrationError, TimeRangeError
 from ..model.system import LinearSystem
 from .integration import intervals
 from .mean_response import MeanResponse, with_mean_tables
@@ -135,7 +135,7 @@ def sweep(
     """
     system, ends = engine.system, check_times(engine.system, times)
     SweepOptions(relative_tolerance)
-    check_direct_noise(engine, engine.system.output_names if responses is None else responses)
+    system.refuse_direct_noise(system.output_names if responses is None else responses)
     longest = LONGEST_SEGMENT if weighting_spacing is None else min(LONGEST_SEGMENT, weighting_spacing)
     # an end time at the start needs no integration, only a segment to read it in
     last = ends[-1] if ends[-1] > system.start else min(system.end, system.start + longest)
@@ -261,19 +261,6 @@ def check_times(system: LinearSystem, times: ArrayLike) -> NDArray[np.float64]:
     if not (np.diff(ends) > 0).all():
         raise TimeRangeError(f"end times must increase; look after {ends[np.argmin(np.diff(ends) > 0)]:g} s")
     return ends
-
-
-def check_direct_noise(engine: CompiledSweep, responses: Sequence[str]) -> None:
-    """Raise DirectNoiseError if white noise reaches one of the responses directly."""
-    system, D = engine.system, engine.system.D.sparsity()
-    for row, column in zip(D.row(), D.get_col(), strict=True):
-        if system.output_names[row] in responses:
-            noise = system.noises[column]
-            raise DirectNoiseError(
-                f"white noise of source '{noise.source}' reaches '{system.output_names[row]}' directly, so that its "
-                "variance is infinite; colour the noise (white = false with a correlation time) or leave the response "
-                "out"
-            )
 
 
 def flight_segments(system: LinearSystem, times: NDArray[np.float64], longest: float) -> Segments:
