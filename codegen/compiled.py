@@ -85,19 +85,11 @@ class ExecutableSystem:
         self, times: NDArray[np.float64], low: float, high: float
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return B (k, n, n_w) and E (k, n, n_u) at many times."""
-        found = self.matrices_at(times, low, high)
-        return found["B"], found["E"]
-
-    def matrices_at(self, times: NDArray[np.float64], low: float, high: float) -> dict[str, NDArray[np.float64]]:
-        """Return A, B, C, D, E, G and the known inputs at many times, each (k, rows, columns)."""
-        k = times.size
+        k, n = times.size, len(self.system.states)
         fixed = (np.full(k, low), np.full(k, high), np.tile(self.parameters[:, None], k), np.full(k, self.address))
-        values = self.functions.matrices.map(k)(times, *fixed)
-        shapes = [self.functions.matrices.size_out(i) for i in range(len(MATRICES))]
-        return {
-            name: value.full().reshape(rows, k, columns).transpose(1, 0, 2)
-            for name, value, (rows, columns) in zip(MATRICES, values, shapes, strict=True)
-        }
+        found = dict(zip(MATRICES, self.functions.matrices.map(k)(times, *fixed), strict=True))
+        B, E = (found[name].full().reshape(n, k, found[name].shape[1] // k).transpose(1, 0, 2) for name in ("B", "E"))
+        return B, E
 
     def with_numbers(
         self, *, groups: tuple[TableGroup, ...] | None = None, parameters: NDArray[np.float64] | None = None

@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg.lapack import dgetrf, dgetrs
 
-from ..codegen.compiled import ExecutableSystem
 from ..model.errors import IntegrationError
 from ..model.system import LinearSystem
 from ..model.tables import TableGroup
@@ -115,30 +114,23 @@ def _knot_times(groups: Sequence[TableGroup], begin: float, end: float, step: fl
         if group.argument == "time":
             found.append(group.knots)
             continue
-        argument = _values_by_name(groups, fine)[group.argument]
-        for knot in group.knots:
-            crossings = np.flatnonzero((argument[:-1] < knot) != (argument[1:] < knot))
-            for i in crossings:
-                found.append(np.array([_crossing(groups, group.argument, knot, fine[i], fine[i + 1])]))
+        argument = _values(groups, group.argument, fine)
+        passed = (argument[:-1, None] < group.knots) != (argument[1:, None] < group.knots)
+        step_of, knot_of = np.nonzero(passed)
+        low, high, knot = fine[step_of], fine[step_of + 1], group.knots[knot_of]
+        f_low, f_high = argument[step_of] - knot, argument[step_of + 1] - knot
+        for _ in range(3):  # secants: the table is nearly straight over a quarter of a step
+            rise = np.where(f_high == f_low, np.inf, f_high - f_low)
+            low, high, f_low = high, high - f_high * (high - low) / rise, f_high
+            f_high = _values(groups, group.argument, high) - knot
+        found.append(high)
     times = np.unique(np.concatenate(found))
     times = times[(times > begin) & (times < end)]
     return times[np.concatenate([[True], np.diff(times) > FIRST_STEP])] if times.size else times
 
 
-def _crossing(groups: Sequence[TableGroup], name: str, value: float, low: float, high: float) -> float:
-    at = [low, high]
-    f = [float(_values_by_name(groups, np.array([t]))[name][0]) - value for t in at]
-    for _ in range(4):  # the table is nearly straight over a quarter of a step
-        if f[1] == f[0]:
-            break
-        t = at[1] - f[1] * (at[1] - at[0]) / (f[1] - f[0])
-        at, f = [at[1], t], [f[1], float(_values_by_name(groups, np.array([t]))[name][0]) - value]
-    return float(np.clip(at[1], low, high))
-
-
-def _values_by_name(groups: Sequence[TableGroup], times: NDArray) -> dict[str, NDArray]:
-    values = tables_at(groups, times)
-    return dict(zip((n for g in groups for n in g.names), values.T, strict=True))
+def _values(groups: Sequence[TableGroup], name: str, times: NDArray) -> NDArray[np.float64]:
+    return tables_at(groups, times)[:, [n for g in groups for n in g.names].index(name)]
 
 
 def tables_at(groups: Sequence[TableGroup], times: NDArray) -> NDArray[np.float64]:
@@ -157,16 +149,19 @@ class Collocation:
 
     Parameters
     ----------
-    executable : ExecutableSystem
     grid : Grid
+    A : (k, 3, n, n) array
+        State matrix at the nodes.
+
+    Raises
+    ------
+    IntegrationError
     """
 
-    def __init__(self, executable: ExecutableSystem, grid: Grid):
+    def __init__(self, grid: Grid, A: NDArray[np.float64]):
         self.grid = grid
-        k, n = grid.steps.size, len(executable.system.states)
-        times = grid.nodes.ravel()
-        A = executable.matrices_at(times, grid.edges[0], grid.edges[-1])["A"]
-        self._n, self._A = n, A.reshape(k, 3, n, n)
+        k, n = A.shape[0], A.shape[-1]
+        self._n, self._A = n, A
         # N = I - h A (a x I), the equations of the stage derivatives
         blocks = -grid.steps[:, None, None, None, None] * STAGES[:, None, :, None] * self._A[:, :, :, None, :]
         matrices = blocks.reshape(k, 3 * n, 3 * n)

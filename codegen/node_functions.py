@@ -1,7 +1,7 @@
-"""Gradients of bilinear forms of a system with respect to all parameters and table values, by reverse derivatives.
+"""A system's matrices, and gradients of two forms of it, at many points in time at once.
 
-One reverse evaluation gives the derivatives with respect to every parameter and every table value at once, however
-many there are. Two forms suffice for every first derivative of a variance or a mean:
+One reverse evaluation gives the derivatives with respect to every parameter and every table value, however many
+there are. Two forms suffice for every first derivative of a variance or a mean:
 
     quadratic   2 a' A y + sum_j m_j (B' a)_j^2 + 2 c' C y
     linear      a' (A x + E u) + c' (C x + G u)
@@ -13,7 +13,9 @@ from __future__ import annotations
 
 import ctypes
 import hashlib
+import logging
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 import casadi as ca
@@ -26,7 +28,11 @@ from .cache import CacheError, compiled_library
 from .compiler import find_compiler
 from .expressions import c_function, enumerators
 
+log = logging.getLogger(__name__)
+
+MATRICES = ("A", "B", "C", "E", "G", "inputs")
 ARGUMENTS = {
+    "node_matrices": ("t", "v", "p"),
     "quadratic_gradient": ("t", "v", "p", "a", "y", "c", "m"),
     "linear_gradient": ("t", "v", "p", "a", "x", "c"),
 }
@@ -36,8 +42,8 @@ _ENVIRONMENT = jinja2.Environment(
 _POINTER = ctypes.POINTER(ctypes.c_double)
 
 
-def gradient_functions(system: LinearSystem) -> tuple[ca.Function, ca.Function]:
-    """Derive the gradients of the quadratic and of the linear form, each of length n_p + n_v, parameters first."""
+def derive_functions(system: LinearSystem) -> tuple[ca.Function, ca.Function, ca.Function]:
+    """Derive the nonzeros of the matrices, and the gradients of both forms, (n_p + n_v,), parameters first."""
     n, r = len(system.states), len(system.outputs)
     a, y, c, m = (ca.SX.sym(s, k) for s, k in (("a", n), ("y", n), ("c", r), ("m", len(system.noises))))
     signals = ca.vertcat(system.x, system.w, system.u)
@@ -58,14 +64,21 @@ def gradient_functions(system: LinearSystem) -> tuple[ca.Function, ca.Function]:
     )
     numbers = ca.vertcat(system.p, system.v)
     first = [system.time, system.v, system.p, a, y, c]
+    nonzeros = (ca.vertcat(ca.SX(0, 1), *matrix.nonzeros()) for matrix in matrices(system))
     return (
+        ca.Function("node_matrices", first[:3], [ca.densify(ca.vertcat(*nonzeros))]),
         ca.Function("quadratic_gradient", [*first, m], [ca.densify(ca.gradient(quadratic, numbers))]),
         ca.Function("linear_gradient", first, [ca.densify(ca.gradient(linear, numbers))]),
     )
 
 
-def gradient_source(system: LinearSystem, functions: tuple[ca.Function, ca.Function]) -> str:
-    """Return C that evaluates both gradients at many points."""
+def matrices(system: LinearSystem) -> tuple[ca.SX, ...]:
+    """Return A, B, C, E, G and the known inputs, sparse."""
+    return system.A, system.B, system.C, system.E, system.G, ca.sparsify(system.input_values)
+
+
+def nodes_source(system: LinearSystem, functions: tuple[ca.Function, ...]) -> str:
+    """Return C that evaluates the functions at many points."""
     names = {
         "v": enumerators("V", [name for g in system.tables for name in g.names]),
         "p": enumerators("P", system.parameter_names),
@@ -75,12 +88,12 @@ def gradient_source(system: LinearSystem, functions: tuple[ca.Function, ca.Funct
             "name": f.name(),
             "arguments": list(zip(ARGUMENTS[f.name()], (f.numel_in(i) for i in range(f.n_in())), strict=True)),
             "size": f.numel_out(0),
-            "core": c_function(f"{f.name()}_core", f, ARGUMENTS[f.name()], ("gradient",), names),
+            "core": c_function(f"{f.name()}_core", f, ARGUMENTS[f.name()], ("result",), names),
         }
         for f in functions
     ]
-    return _ENVIRONMENT.get_template("gradients.c.jinja").render(
-        title=f"{system.name}: gradients with respect to parameters and table values",
+    return _ENVIRONMENT.get_template("node_functions.c.jinja").render(
+        title=f"{system.name}: matrices, and gradients with respect to parameters and table values",
         table_names=names["v"],
         parameter_names=names["p"],
         loops=loops,
@@ -88,19 +101,39 @@ def gradient_source(system: LinearSystem, functions: tuple[ca.Function, ca.Funct
 
 
 @dataclass(frozen=True, eq=False)
-class Gradients:
-    """Both gradients, compiled where a compiler is found, else interpreted.
+class NodeFunctions:
+    """The functions of a system at many points, compiled where a compiler is found, else interpreted.
 
     Attributes
     ----------
-    functions : (quadratic, linear) CasADi functions
+    functions : CasADi functions
+        Nonzeros of the matrices, gradient of the quadratic and of the linear form.
+    patterns : tuple of Sparsity
+        Of A, B, C, E, G and the known inputs.
     library : Path or None
     """
 
-    functions: tuple[ca.Function, ca.Function]
+    functions: tuple[ca.Function, ca.Function, ca.Function]
+    patterns: tuple[ca.Sparsity, ...]
     library: Path | None
 
-    def quadratic(self, *arguments: NDArray[np.float64]) -> NDArray[np.float64]:
+    def matrices(self, t: NDArray, v: NDArray, p: NDArray) -> dict[str, NDArray[np.float64]]:
+        """Return A, B, C, E, G and the known inputs at k points, each (k, rows, columns).
+
+        Parameters
+        ----------
+        t : (k,) array
+        v : (k, n_v) array
+        p : (n_p,) array
+        """
+        values, first, found = self._evaluate(0, (t, v, p)), 0, {}
+        for name, pattern in zip(MATRICES, self.patterns, strict=True):
+            dense = np.zeros((t.size, *pattern.shape))
+            dense[:, pattern.row(), pattern.get_col()] = values[:, first : first + pattern.nnz()]
+            found[name], first = dense, first + pattern.nnz()
+        return found
+
+    def quadratic_gradient(self, *arguments: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the gradient of the quadratic form at k points, (k, n_p + n_v).
 
         Parameters
@@ -109,14 +142,14 @@ class Gradients:
             t (k,), v (k, n_v), p (n_p,), a (k, n), y (k, n), c (k, n_y), m (n_w,). One-dimensional ones but t are the
             same at every point.
         """
-        return self._evaluate(self.functions[0], arguments)
+        return self._evaluate(1, arguments)
 
-    def linear(self, *arguments: NDArray[np.float64]) -> NDArray[np.float64]:
+    def linear_gradient(self, *arguments: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the gradient of the linear form at k points; arguments t, v, p, a, x, c as above."""
-        return self._evaluate(self.functions[1], arguments)
+        return self._evaluate(2, arguments)
 
-    def _evaluate(self, function: ca.Function, arguments: tuple[NDArray[np.float64], ...]) -> NDArray[np.float64]:
-        count = arguments[0].size
+    def _evaluate(self, which: int, arguments: tuple[NDArray[np.float64], ...]) -> NDArray[np.float64]:
+        function, count = self.functions[which], arguments[0].size
         arrays = [np.ascontiguousarray(x, float) for x in arguments]
         if self.library is None:
             columns = [
@@ -134,32 +167,35 @@ class Gradients:
         return found
 
 
-def system_gradients(system: LinearSystem, compile: bool = True) -> Gradients:
-    """Derive the gradients of a system and, where a compiler is found, generate and compile their C.
+@lru_cache(maxsize=4)
+def node_functions(system: LinearSystem, compile: bool = True) -> NodeFunctions:
+    """Derive the functions of a system and, where a compiler is found, generate and compile their C.
 
     Raises
     ------
     CompilerError
         If a compiler was found and failed.
     """
-    functions = gradient_functions(system)
+    functions = derive_functions(system)
+    patterns = tuple(matrix.sparsity() for matrix in matrices(system))
     compiler = find_compiler() if compile else None
     if compiler is None:
-        return Gradients(functions, None)
+        return NodeFunctions(functions, patterns, None)
     here = Path(__file__).parent
     digest = hashlib.sha256(repr((system.name, system.parameter_names, [g.names for g in system.tables])).encode())
     for function in functions:
         digest.update(function.serialize().encode())
-    for file in ("gradients.py", "expressions.py", "templates/gradients.c.jinja"):
+    for file in ("node_functions.py", "expressions.py", "templates/node_functions.c.jinja"):
         digest.update((here / file).read_bytes())
     try:
         library = compiled_library(
-            f"{system.name}-gradients",
+            f"{system.name}-nodes",
             digest.hexdigest(),
-            lambda: gradient_source(system, functions),
+            lambda: nodes_source(system, functions),
             compiler,
             dict(system.structure),
-        )
-    except CacheError:
-        return Gradients(functions, None)
-    return Gradients(functions, library.path)
+        ).path
+    except CacheError as error:
+        log.info("the sensitivities of %s are interpreted: %s", system.name, error)
+        library = None
+    return NodeFunctions(functions, patterns, library)
