@@ -86,7 +86,8 @@ class AdjointPair:
         self.grid: Grid = collocation_grid(system, executable.groups, time, step)
         self.mask = np.array([float(noise.source in sources) for noise in system.noises])
         last = intervals(system, system.start, time)[-1]
-        self._low, self._high = last.low, last.high
+        self._low, self.end = last.low, last.high  # the end from the left, where it is a discontinuity
+        self.tables_at_end = tables_at(executable.groups, np.array([self.end]))[0]
         self.at_end = executable.matrices(time, last.low, last.high)
         times, shape = self.grid.nodes.ravel(), self.grid.nodes.shape
         self.tables = tables_at(executable.groups, times)
@@ -114,7 +115,7 @@ class AdjointPair:
     @cached_property
     def slopes(self) -> tuple[float, float]:
         """Derivatives of variance and mean with respect to t2, between discontinuities."""
-        low, high = self._low, self._high
+        low, high = self._low, self.end
         if high < self.time:  # on a discontinuity: its left side
             before, after = self.time - 2 * SLOPE_STEP, self.time
         else:
@@ -137,7 +138,7 @@ class AdjointPair:
         n, r, n_p = len(system.states), len(system.outputs), system.p.numel()
         times, weights = self.grid.nodes.ravel(), self.grid.weights.ravel()
         v, functions = self.tables, self.functions
-        end, v_end = np.array([self._high]), tables_at(self.executable.groups, np.array([self._high]))
+        end, v_end = np.array([self.end]), self.tables_at_end[None]
         none, selected = np.zeros(r), np.eye(r)[self.response]
         total = np.zeros((times.size, n_p + v.shape[1]))
         total_end = np.zeros(n_p + v.shape[1])

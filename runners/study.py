@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import xarray as xr
@@ -21,8 +22,9 @@ from ..model.vehicle import Vehicle, load_vehicle
 from .adjoint import AdjointSolver
 from .integration import IntegratorOptions
 from .mean_response import with_mean_tables
+from .sensitivity import sensitivity
 from .stability import Root, check_coupling, matrices_at, roots, warn_if_unstable
-from .statistics import ResponseStatistics, response_dataset, weighting_dataset
+from .statistics import COMBINED, ResponseStatistics, response_dataset, weighting_dataset
 from .wind_start import covariance_at
 
 Progress = Callable[[float], None]
@@ -198,6 +200,49 @@ class Study:
             raise TimeRangeError(f"a spacing of {spacing:g} s is not positive")
         history = AdjointSolver(self.with_means, options or IntegratorOptions()).history(float(time), spacing)
         return weighting_dataset(self, float(time), history)
+
+    def sensitivity(
+        self,
+        response: str,
+        time: float | Literal["peak"],
+        *,
+        source: str = COMBINED,
+        quantity: str = "std",
+        parameters: Iterable[str] | None = None,
+        elasticity: bool = True,
+    ) -> xr.Dataset:
+        """Return exact derivatives of one number with respect to every parameter, table and table row.
+
+        Parameters
+        ----------
+        response : str
+        time : float or 'peak'
+            t2, s; 'peak' is the time at which the quantity is largest, located between output times.
+        source : str
+            A noise source, or 'combined'.
+        quantity : {'std', 'variance', 'mean', 'mean_plus_3sigma'}
+        parameters : iterable of str, optional
+            All without it.
+        elasticity : bool
+            False leaves out the derivatives in percent per percent, which a quantity of zero does not have.
+
+        Returns
+        -------
+        xarray.Dataset
+            ``derivative`` and ``elasticity`` (parameter); ``table_derivative`` (table, t) per second of flight, with
+            ``table_derivative_at_end`` (table), the weight of its delta at t2, and ``node_weight`` (t) to integrate
+            with; ``knot_derivative`` (knot) by row; ``wind_sigma_elasticity`` (band) by kilometre of altitude.
+
+        Raises
+        ------
+        UnknownNameError, StructuralParameterError, TimeRangeError, DirectNoiseError, ZeroQuantityError
+
+        Warns
+        -----
+        UndefinedElasticityWarning
+            Parameters that are zero; their ``elasticity_defined`` is 0.
+        """
+        return sensitivity(self, response, time, source, quantity, parameters, elasticity)
 
     def _check_times(self, times: list[float]) -> None:
         if not times:
