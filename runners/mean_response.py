@@ -36,7 +36,9 @@ class MeanResponse:
     outputs: NDArray[np.float64]
 
 
-def mean_response(executable: ExecutableSystem, times: NDArray[np.float64]) -> MeanResponse:
+def mean_response(
+    executable: ExecutableSystem, times: NDArray[np.float64], relative_tolerance: float = TOLERANCE
+) -> MeanResponse:
     """Integrate the mean forward.
 
     Parameters
@@ -44,6 +46,7 @@ def mean_response(executable: ExecutableSystem, times: NDArray[np.float64]) -> M
     executable : ExecutableSystem
     times : (k,) array
         Increasing, the first at the start of the system; between two discontinuities they are equidistant.
+    relative_tolerance : float
 
     Raises
     ------
@@ -51,7 +54,7 @@ def mean_response(executable: ExecutableSystem, times: NDArray[np.float64]) -> M
     """
     system = executable.system
     scale = state_scales(system)
-    integrator = Integrator(executable.functions.mean, IntegratorOptions(relative_tolerance=TOLERANCE))
+    integrator = Integrator(executable.functions.mean, IntegratorOptions(relative_tolerance=relative_tolerance))
     states = [np.zeros(len(scale))]
     outputs: list[NDArray] = []
     response = executable.functions.response
@@ -75,7 +78,7 @@ def mean_response(executable: ExecutableSystem, times: NDArray[np.float64]) -> M
     return MeanResponse(times, np.array(states), np.concatenate(outputs))
 
 
-def with_mean_tables(executable: ExecutableSystem) -> ExecutableSystem:
+def with_mean_tables(executable: ExecutableSystem, relative_tolerance: float = TOLERANCE) -> ExecutableSystem:
     """Return the system with its tables of the mean response filled in, if it has any."""
     system = executable.system
     at = next(
@@ -84,7 +87,7 @@ def with_mean_tables(executable: ExecutableSystem) -> ExecutableSystem:
     if at is None:
         return executable
     group = executable.groups[at]
-    mean = mean_response(executable, group.knots)
+    mean = mean_response(executable, group.knots, relative_tolerance)
     columns = []
     for name in group.names:
         kind, what = MEAN_TABLES[name]

@@ -23,6 +23,7 @@ from .adjoint import AdjointSolver
 from .integration import IntegratorOptions
 from .mean_response import with_mean_tables
 from .sensitivity import sensitivity
+from .sensitivity_check import check_sensitivity
 from .stability import Root, check_coupling, matrices_at, roots, warn_if_unstable
 from .statistics import COMBINED, ResponseStatistics, response_dataset, weighting_dataset
 from .wind_start import covariance_at
@@ -243,6 +244,33 @@ class Study:
             Parameters that are zero; their ``elasticity_defined`` is 0.
         """
         return sensitivity(self, response, time, source, quantity, parameters, elasticity)
+
+    def check_sensitivity(
+        self,
+        response: str,
+        time: float | Literal["peak"],
+        *,
+        source: str = COMBINED,
+        quantity: str = "std",
+        parameters: Iterable[str] | None = None,
+        rows: int = 0,
+    ) -> xr.Dataset:
+        """Compare :meth:`sensitivity` with central differences of CVODES at a tolerance of 1e-12.
+
+        Parameters
+        ----------
+        response, time, source, quantity, parameters
+            As there.
+        rows : int
+            Of how many tables the row with the largest elasticity is checked too.
+
+        Returns
+        -------
+        xarray.Dataset
+            Over (item): ``derivative``, ``difference``, its ``uncertainty``, how far they are ``apart`` and whether
+            the sensitivity ``agrees`` to 1e-5 and the uncertainty.
+        """
+        return check_sensitivity(self, response, time, source, quantity, parameters, rows)
 
     def _check_times(self, times: list[float]) -> None:
         if not times:
