@@ -1,4 +1,4 @@
-"""The command line: ``ascentwind run``, ``vehicles``, ``new-vehicle``, ``inspect``, ``regenerate``, ``doctor``."""
+"""The command line: ``ascentwind run``, ``sensitivity``, ``vehicles``, ``new-vehicle``, ``inspect`` and more."""
 
 from __future__ import annotations
 
@@ -116,6 +116,33 @@ def _print_peaks(statistics) -> None:
     at_end = any(peak.at_end for peak in found)
     if at_end:
         console.print("* on the first or last end time asked for; the peak of the flight may lie beyond", style="dim")
+
+
+@app.command()
+def sensitivity(
+    vehicle: VehicleArgument,
+    response: Annotated[str | None, typer.Option(help="Response; the vehicle's first without it.")] = None,
+    time: Annotated[str, typer.Option(help="End time in s, or 'peak'.")] = "peak",
+    source: Annotated[str, typer.Option(help="A noise source, or 'combined'.")] = "combined",
+    quantity: Annotated[str, typer.Option(help="std, variance, mean or mean_plus_3sigma.")] = "mean_plus_3sigma",
+    out: Annotated[Path | None, typer.Option(help="Folder for results; VEHICLE-sensitivity without it.")] = None,
+) -> None:
+    """Which parameter, second of a table and kilometre of wind drives a response: exact derivatives, ranked."""
+    from .output import prepare_folder
+    from .sensitivity_output import print_sensitivity, write_sensitivity
+    from .study import Study
+    from .times import parse_time_or_peak
+
+    at = parse_time_or_peak(time)
+    folder = out or Path(f"{Path(vehicle).name}-sensitivity")
+    prepare_folder(folder)
+    with console.status("loading and preparing code"):
+        study = Study.load(vehicle)
+    with console.status("finding the peak and differentiating" if at == "peak" else "differentiating"):
+        found = study.sensitivity(response or study.system.output_names[0], at, source=source, quantity=quantity)
+    print_sensitivity(found, console)
+    written = write_sensitivity(found, folder)
+    console.print(f"{len(written)} files in {folder}: {', '.join(p.name for p in written)}", soft_wrap=True)
 
 
 @app.command()

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 Quantity = Literal["std", "variance", "mean", "mean_plus_3sigma"]
 QUANTITIES: tuple[str, ...] = ("std", "variance", "mean", "mean_plus_3sigma")
 BAND = 1000.0  # m, of altitude
+WIND_MEAN = "wind.mean"
 WIND_OUTPUT = "wind_filter.H_"  # tables that a relative change of the wind's sigma multiplies
 STRUCTURAL = re.compile(r"(count|number|order|modes?|tanks?|masses|sources?|states?|loads?|outputs?)$")
 
@@ -219,9 +220,7 @@ def _parameters_dataset(
     return dataset
 
 
-def _tables_dataset(
-    study: Study, pair: AdjointPair, gradient: Gradient, value: float, elasticity: bool
-) -> xr.Dataset:
+def _tables_dataset(study: Study, pair: AdjointPair, gradient: Gradient, value: float, elasticity: bool) -> xr.Dataset:
     groups = study.with_means.groups
     names = [n for g in groups for n in g.names]
     units = [u for g in groups for u in g.units]
@@ -254,25 +253,30 @@ def _tables_dataset(
     if over is not None:
         at = values[:, names.index(over)]
         dataset[over] = ("t", at, {"units": units[names.index(over)], "long_name": f"{over} at a time"})
-        wind = [i for i, n in enumerate(names) if n.startswith(WIND_OUTPUT)]
-        if wind and elasticity:
-            share = gradient.weights * (density * values)[:, wind].sum(axis=1) / value
-            last = float((at_end * values_at_end)[wind].sum() / value)
-            dataset = dataset.merge(_bands(at, share, float(values_at_end[names.index(over)]), last))
+        if elasticity:
+            relative, last = gradient.weights[:, None] * density * values / value, at_end * values_at_end / value
+            for label, what, chosen in (
+                ("wind_sigma_elasticity", "the wind's sigma", [n for n in names if n.startswith(WIND_OUTPUT)]),
+                ("wind_mean_elasticity", "the mean wind", [n for n in names if n == WIND_MEAN]),
+            ):
+                if chosen:
+                    rows = [names.index(n) for n in chosen]
+                    end = (float(values_at_end[names.index(over)]), float(last[rows].sum()))
+                    dataset = dataset.merge(_bands(label, what, at, relative[:, rows].sum(axis=1), *end))
     return dataset
 
 
-def _bands(altitude: NDArray, share: NDArray, altitude_at_end: float, share_at_end: float) -> xr.Dataset:
-    """Return the elasticity to the wind's sigma in each kilometre of altitude."""
+def _bands(
+    label: str, what: str, altitude: NDArray, share: NDArray, altitude_at_end: float, share_at_end: float
+) -> xr.Dataset:
+    """Return the elasticity to a quantity over altitude in each kilometre."""
     edges = BAND * np.arange(np.floor(altitude.min() / BAND), np.floor(altitude.max() / BAND) + 2)
     found = np.histogram(altitude, edges, weights=share)[0]
     found[min(int((altitude_at_end - edges[0]) / BAND), found.size - 1)] += share_at_end
-    dataset = xr.Dataset(
-        {"wind_sigma_elasticity": ("band", found, {"units": "1"})},
+    return xr.Dataset(
+        {label: ("band", found, {"units": "1", "long_name": f"percent per percent of {what} in that kilometre"})},
         {"band": ("band", edges[:-1] + BAND / 2, {"units": "m", "long_name": "middle of a kilometre of altitude"})},
     )
-    dataset["wind_sigma_elasticity"].attrs["long_name"] = "percent per percent of the wind's sigma in that kilometre"
-    return dataset
 
 
 def total_density(groups: tuple[TableGroup, ...], values: NDArray, density: NDArray) -> NDArray[np.float64]:

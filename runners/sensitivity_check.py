@@ -106,7 +106,7 @@ def check_sensitivity(
         labels.append(f"{name} at {found['knot_argument'].values[k]:g}")
         at.append(number)
         derivatives.append(float(found["knot_derivative"].values[k]))
-        differences.append(central_difference(of_row, number, STEP * abs(number)))
+        differences.append(central_difference(of_row, number, STEP * _reach(study.vehicle, name, row)))
     return _agreement(labels, np.array(at), np.array(derivatives), differences, value, found.attrs)
 
 
@@ -128,6 +128,13 @@ def _largest_rows(found: xr.Dataset, count: int) -> list[int]:
         if len(chosen) == count:
             break
     return list(chosen.values())
+
+
+def _reach(vehicle: Vehicle | None, name: str, row: int) -> float:
+    """Return by how much a row may move: its own size, or for the altitude, which must increase, its rise."""
+    assert vehicle is not None
+    values = vehicle_rows(vehicle)[name].values
+    return abs(float(np.diff(values)[max(row - 1, 0)] if name == "altitude" else values[row]))
 
 
 def _with_row(vehicle: Vehicle, name: str, row: int, value: float) -> Vehicle:

@@ -108,8 +108,7 @@ class AdjointPair:
         known = np.einsum("kinu,kiu->kin", self.matrices["E"], self.matrices["inputs"][..., 0])
         self.states, self.states_at_end = self.solver.forward(np.zeros(len(system.states)), known)
         self.mean = float(
-            self.at_end["C"][response] @ self.states_at_end
-            + self.at_end["G"][response] @ self.at_end["inputs"][:, 0]
+            self.at_end["C"][response] @ self.states_at_end + self.at_end["G"][response] @ self.at_end["inputs"][:, 0]
         )
 
     @cached_property

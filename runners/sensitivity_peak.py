@@ -67,5 +67,3 @@ def _range(study: Study) -> list[float]:
     if not np.isfinite(end):
         raise TimeRangeError(f"system '{study.system.name}' has no end to search for a peak; give a time in seconds")
     return np.linspace(start, end, SCAN_POINTS + 1)[1:].tolist()
-
-

@@ -112,9 +112,7 @@ def _differences(table: Table, points: NDArray, order: int) -> NDArray[np.float6
     columns = []
     for row in np.eye(table.argument.size):
         up, down = (
-            replace(table, values=table.values + sign * step * row).polynomial(points, order)
-            for sign in (1, -1)
+            replace(table, values=table.values + sign * step * row).polynomial(points, order) for sign in (1, -1)
         )
         columns.append((up - down) / (2 * step))
     return np.stack(columns, axis=1)
-
