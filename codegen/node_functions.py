@@ -185,7 +185,7 @@ def node_functions(system: LinearSystem, compile: bool = True) -> NodeFunctions:
     digest = hashlib.sha256(repr((system.name, system.parameter_names, [g.names for g in system.tables])).encode())
     for function in functions:
         digest.update(function.serialize().encode())
-    for file in ("node_functions.py", "expressions.py", "templates/node_functions.c.jinja"):
+    for file in ("node_functions.py", "expressions.py", "templates/node_functions.c.jinja", "templates/collocation.c"):
         digest.update((here / file).read_bytes())
     try:
         library = compiled_library(

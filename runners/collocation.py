@@ -7,9 +7,12 @@ discretised variance (Sanz-Serna 2016, SIAM Review 58, 3-33).
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +22,9 @@ from ..model.errors import IntegrationError
 from ..model.system import LinearSystem
 from ..model.tables import TableGroup
 
-STEP = 0.03  # s, the longest: derivatives of AS-504 are then within 3e-6 of their limit (docs/sensitivity.md)
+STEP = 0.05  # s, the longest
+PHASE = 0.35  # rad, the longest step of the fastest lightly damped root: its error is then 6e-9 rad
+LIGHT = 0.3  # damping ratio below which a root rings on through the flight
 FIRST_STEP = 5e-4  # s, beside the ends and discontinuities, where filter poles near 100 rad/s leave fast transients
 GROWTH = 0.15  # of the step with distance from there, s/s
 
@@ -79,6 +84,13 @@ def collocation_grid(system: LinearSystem, groups: Sequence[TableGroup], end: fl
             edges.append(_time_at(np.linspace(a, b, count + 1)[1:], low, high, step))
         edges[-1][-1] = high
     return Grid(np.concatenate(edges))
+
+
+def longest_step(matrices: Sequence[NDArray[np.float64]]) -> float:
+    """Return the longest step (s) that follows the lightly damped roots of the state matrices."""
+    roots = np.linalg.eigvals(np.stack(matrices)).ravel()
+    ringing = np.abs(roots[-roots.real < LIGHT * np.abs(roots)])
+    return float(min(STEP, PHASE / max(ringing.max(initial=0.0), PHASE / STEP)))
 
 
 def _steps_from_edge(times: NDArray, low: float, high: float, step: float) -> NDArray:
@@ -145,7 +157,7 @@ def tables_at(groups: Sequence[TableGroup], times: NDArray) -> NDArray[np.float6
 
 
 class Collocation:
-    """The system and its adjoint on a grid: every step factorised once, solved forward and backward.
+    """The system and its adjoint on a grid by LAPACK: every step factorised once, solved forward and backward.
 
     Parameters
     ----------
@@ -196,7 +208,7 @@ class Collocation:
             x = x + h * (WEIGHTS @ rates)
         return stages, x
 
-    def backward(self, end: NDArray, forcing: NDArray | None = None) -> tuple[NDArray, NDArray]:
+    def backward(self, end: NDArray, forcing: NDArray) -> tuple[NDArray, NDArray]:
         """Solve a' = -A' a - f from the end.
 
         Returns
@@ -207,12 +219,47 @@ class Collocation:
         a, stages = end, np.empty((self.grid.steps.size, 3, self._n))
         for step in reversed(range(self.grid.steps.size)):
             h, (lu, pivots) = self.grid.steps[step], self._factors[step]
-            right = np.outer(WEIGHTS, a)
-            if forcing is not None:
-                right += h * STAGES.T @ (WEIGHTS[:, None] * forcing[step])
+            right = np.outer(WEIGHTS, a) + h * STAGES.T @ (WEIGHTS[:, None] * forcing[step])
             weighted = dgetrs(lu, pivots, right.ravel(), trans=0)[0].reshape(3, self._n)
             stages[step] = weighted / WEIGHTS[:, None]
-            a = a + h * np.einsum("iab,ia->b", self._A[step], weighted)
-            if forcing is not None:
-                a = a + h * WEIGHTS @ forcing[step]
+            a = a + h * (np.einsum("iab,ia->b", self._A[step], weighted) + WEIGHTS @ forcing[step])
         return stages, a
+
+
+class CompiledCollocation:
+    """The same in C, which skips the zeros of A; arguments and results as :class:`Collocation`."""
+
+    def __init__(self, grid: Grid, A: NDArray[np.float64], library: Path):
+        k, n = A.shape[0], A.shape[-1]
+        self._code = ctypes.CDLL(str(library))
+        self._shape = (k, 3, n)
+        factors, pivots = np.empty((k, 3 * n, 3 * n)), np.empty((k, 3 * n), np.intc)
+        given = (np.ascontiguousarray(grid.steps), np.ascontiguousarray(A), np.append(STAGES.ravel(), WEIGHTS))
+        self._arrays = (*given, factors, pivots)
+        self._sizes = (ctypes.c_long(k), ctypes.c_long(n))
+        self._code.collocation_factorise.restype = ctypes.c_long
+        failed = self._code.collocation_factorise(*self._sizes, *map(_pointer, self._arrays))
+        if failed:
+            raise IntegrationError(f"the collocation equations are singular at {grid.edges[failed - 1]:g} s")
+
+    def forward(self, start: NDArray, forcing: NDArray) -> tuple[NDArray, NDArray]:
+        return self._solve(self._code.collocation_forward, start, forcing)
+
+    def backward(self, end: NDArray, forcing: NDArray) -> tuple[NDArray, NDArray]:
+        return self._solve(self._code.collocation_backward, end, forcing)
+
+    def _solve(self, code: Any, first: NDArray, forcing: NDArray) -> tuple[NDArray, NDArray]:
+        state, stages = np.array(first, float), np.empty(self._shape)
+        arrays = (np.ascontiguousarray(forcing), state, stages, np.empty(3 * self._shape[2]))
+        code.restype = None
+        code(*self._sizes, *map(_pointer, (*self._arrays, *arrays)))
+        return stages, state
+
+
+def _pointer(array: NDArray) -> ctypes.c_void_p:
+    return array.ctypes.data_as(ctypes.c_void_p)
+
+
+def collocation(grid: Grid, A: NDArray[np.float64], library: Path | None) -> Collocation | CompiledCollocation:
+    """Return the solver of a grid, compiled where there is a library."""
+    return Collocation(grid, A) if library is None else CompiledCollocation(grid, A, library)

@@ -91,9 +91,8 @@ def time_figure(found: xr.Dataset) -> Figure:
 
 def altitude_figure(found: xr.Dataset) -> Figure:
     """Return which kilometre of wind matters: its sigma and its mean."""
-    panels = [
-        (n, t) for n, t in (("sigma", "sigma of the wind"), ("mean", "mean wind")) if f"wind_{n}_elasticity" in found
-    ]
+    titles = {"wind_sigma_elasticity": "sigma of the wind", "wind_mean_elasticity": "mean wind"}
+    panels = [name for name in titles if name in found]
     height = found["band"].values / 1000
     with rc_context(STYLE):
         figure = Figure(figsize=(8.0, 4.6), layout="constrained")

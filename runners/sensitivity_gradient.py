@@ -22,9 +22,10 @@ from ..codegen.compiled import ExecutableSystem
 from ..codegen.node_functions import NodeFunctions
 from ..model.assemble import MEAN_TABLES
 from ..model.system import LinearSystem
-from .collocation import STEP, Collocation, Grid, collocation_grid, tables_at
+from .collocation import Grid, collocation, collocation_grid, longest_step, tables_at
 from .integration import intervals
 
+FROZEN = 7  # times at which the roots of A are looked at
 SLOPE_STEP = 1e-3  # s, of central differences of the output matrices, which are cubic in time
 
 
@@ -67,8 +68,8 @@ class AdjointPair:
     time : float
         t2, s; on a discontinuity it is seen from the left.
     sources : tuple of str
-    step : float
-        Longest step, s.
+    step : float, optional
+        Longest step, s; from the roots of A without it.
     """
 
     def __init__(
@@ -78,11 +79,15 @@ class AdjointPair:
         response: int,
         time: float,
         sources: tuple[str, ...],
-        step: float = STEP,
+        step: float | None = None,
     ):
         system = executable.system
         self.executable, self.functions = executable, functions
         self.response, self.time, self.sources = response, time, sources
+        if step is None:
+            spread = system.start + (time - system.start) * (np.arange(FROZEN) + 0.5) / FROZEN
+            frozen = functions.matrices(spread, tables_at(executable.groups, spread), executable.parameters)
+            step = longest_step(frozen["A"])
         self.grid: Grid = collocation_grid(system, executable.groups, time, step)
         self.mask = np.array([float(noise.source in sources) for noise in system.noises])
         last = intervals(system, system.start, time)[-1]
@@ -93,9 +98,11 @@ class AdjointPair:
         self.tables = tables_at(executable.groups, times)
         flat = functions.matrices(times, self.tables, executable.parameters)
         self.matrices = {name: value.reshape(*shape, *value.shape[1:]) for name, value in flat.items()}
-        self.solver = Collocation(self.grid, self.matrices["A"])
+        self.solver = collocation(self.grid, self.matrices["A"], functions.library)
 
-        self.adjoint, self.adjoint_at_start = self.solver.backward(self.at_end["C"][response])
+        self.adjoint, self.adjoint_at_start = self.solver.backward(
+            self.at_end["C"][response], np.zeros((*shape, len(system.states)))
+        )
         B = self.matrices["B"]
         white = self.mask * np.einsum("kinw,kin->kiw", B, self.adjoint)
         covariance = sum(

@@ -10,6 +10,7 @@ from ascentwind.model import LinearSystem, define_system
 from ascentwind.model.errors import DirectNoiseError, TimeRangeError, UnknownNameError
 from ascentwind.runners import IntegratorOptions, Study
 from ascentwind.runners.adjoint import AdjointSolver
+from ascentwind.runners.collocation import Collocation, CompiledCollocation, Grid
 from ascentwind.runners.sensitivity import StructuralParameterError, UndefinedElasticityWarning, ZeroQuantityError
 from ascentwind.runners.sensitivity_check import central_difference
 from ascentwind.runners.sensitivity_gradient import AdjointPair
@@ -299,6 +300,27 @@ def test_dimensional_analysis_of_the_networks(at_75):
         denominator = e[[n for n in e.index if n.startswith(f"control.{network}.denominator")]].sum()
         assert numerator == pytest.approx(-denominator, rel=1e-6)
         assert numerator == pytest.approx(e[f"control.{network}.gain"], rel=1e-6)
+
+
+def test_compiled_collocation_is_that_by_lapack():
+    """Random stable matrices, with forcing, forward and backward; and the duality of both."""
+    random = np.random.default_rng(504)
+    library = node_functions(driven()).library
+    assert library is not None
+    edges = np.cumsum(np.append(0.0, random.uniform(0.01, 0.1, 20)))
+    A = random.standard_normal((20, 3, 5, 5)) * (random.random((5, 5)) < 0.6) - 2 * np.eye(5)
+    x, a, f, g = *random.standard_normal((2, 5)), *random.standard_normal((2, 20, 3, 5))
+    grid = Grid(edges)
+    compiled, reference = CompiledCollocation(grid, A, library), Collocation(grid, A)
+    for one, other in zip(compiled.forward(x, f), reference.forward(x, f), strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-11, atol=1e-13)
+    for one, other in zip(compiled.backward(a, g), reference.backward(a, g), strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-11, atol=1e-13)
+    stages, end = compiled.forward(x, f)
+    adjoints, start = compiled.backward(a, g)
+    weights = grid.weights[..., None]
+    # a'x at both ends differs by the integral of a'f - x'g, exactly, as the method is symplectic
+    assert a @ end - start @ x == pytest.approx(np.sum(weights * (adjoints * f - stages * g)), abs=1e-12)
 
 
 def test_compiled_and_interpreted_agree(as504):
