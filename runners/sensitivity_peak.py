@@ -10,7 +10,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import brentq
+from scipy.optimize import root_scalar
 
 from ..model.errors import TimeRangeError
 from .integration import IntegratorOptions
@@ -55,7 +55,7 @@ def peak_time(study: Study, request: Request) -> tuple[float, bool]:
         a = float(np.nextafter(a, np.inf)) if a in study.system.discontinuities else a
         candidates += [t for t in (a, b) if t in edges[1:-1]]
         if quantity(a)[1] > 0 > quantity(b)[1]:
-            candidates.append(float(brentq(lambda t: quantity(float(t))[1], a, b, xtol=TIME_TOLERANCE)))
+            candidates.append(float(root_scalar(lambda t: quantity(t)[1], bracket=(a, b), xtol=TIME_TOLERANCE).root))
     found = max(candidates, key=lambda t: quantity(t)[0])
     return found, found in (times[0], times[-1])
 

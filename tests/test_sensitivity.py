@@ -92,7 +92,8 @@ def test_oscillator_with_a_parameter_in_its_output(w, z):
         return k**2 * g**2 * (1 - np.exp(-2 * z * w * s) * ripple) / (4 * z * w**3)
 
     d = found(system, 1.0 + s, "std")
-    assert d.attrs["variance"] == pytest.approx(variance(**values), rel=1e-8)
+    # the phase error of the method, at most steps * 0.35^7 / 100800, is all that is left
+    assert d.attrs["variance"] == pytest.approx(variance(**values), rel=2e-7)
     for name in values:
         expected = derivative(lambda p, name=name: np.sqrt(variance(**(values | {name: p}))), values[name])
         assert d["derivative"].sel(parameter=name).item() == pytest.approx(expected, rel=1e-6)
@@ -221,10 +222,10 @@ def test_every_parameter_against_differences_of_the_same_discretisation(as504):
     """From wind alone, which no mean enters: rounding is all that stands between, so that small ones count too."""
     functions = node_functions(as504.system)
 
-    def pair(study: Study) -> AdjointPair:
-        return AdjointPair(study.with_means, functions, 0, 30.0, ("wind",), 0.05)
+    def pair(changes: dict[str, float]) -> AdjointPair:
+        return AdjointPair(as504.with_parameters(changes).executable, functions, 0, 30.0, ("wind",), 0.05)
 
-    nominal = pair(as504)
+    nominal = pair({})
     gradient = nominal.gradient(1.0, 0.0).parameters
     checked = 0
     for i, (name, parameter) in enumerate(as504.parameters.items()):
@@ -232,7 +233,7 @@ def test_every_parameter_against_differences_of_the_same_discretisation(as504):
         if abs(elasticity) < 1e-6:
             continue
         expected = central_difference(
-            lambda p, name=name: pair(as504.with_parameters({name: p})).variance,
+            lambda p, name=name: pair({name: p}).variance,
             parameter.value,
             0.02 * parameter.value,
             levels=2,
@@ -249,9 +250,9 @@ def test_parameters_and_rows_against_differences_of_cvodes(as504):
         75.0,
         quantity="mean_plus_3sigma",
         parameters=["control.T1.gain", "center_of_pressure.sigma"],
-        rows=3,
+        rows=2,
     )
-    assert d.sizes["item"] == 5
+    assert d.sizes["item"] == 4
     assert d["agrees"].all()
     assert (d["apart"] <= 1e-5 * abs(d["difference"])).all()
     assert (abs(d["uncertainty"]) <= 1e-4 * abs(d["difference"])).all()
