@@ -14,7 +14,7 @@ from __future__ import annotations
 import ctypes
 import hashlib
 import logging
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -24,12 +24,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..model.system import LinearSystem
-from .cache import CacheError, compiled_library
+from .cache import CacheError, compiled_library, set_aside
 from .compiler import find_compiler
 from .expressions import c_function, enumerators
 
 log = logging.getLogger(__name__)
 
+AGREEMENT = 1e-12  # between compiled and interpreted functions, of the largest entry
 MATRICES = ("A", "B", "C", "E", "G", "inputs")
 ARGUMENTS = {
     "node_matrices": ("t", "v", "p"),
@@ -64,9 +65,9 @@ def derive_functions(system: LinearSystem) -> tuple[ca.Function, ca.Function, ca
     )
     numbers = ca.vertcat(system.p, system.v)
     first = [system.time, system.v, system.p, a, y, c]
-    nonzeros = (ca.vertcat(ca.SX(0, 1), *matrix.nonzeros()) for matrix in matrices(system))
+    nonzeros = ca.vertcat(*(matrix.nz[:] for matrix in matrices(system)))
     return (
-        ca.Function("node_matrices", first[:3], [ca.densify(ca.vertcat(*nonzeros))]),
+        ca.Function("node_matrices", first[:3], [ca.densify(nonzeros)]),
         ca.Function("quadratic_gradient", [*first, m], [ca.densify(ca.gradient(quadratic, numbers))]),
         ca.Function("linear_gradient", first, [ca.densify(ca.gradient(linear, numbers))]),
     )
@@ -179,8 +180,9 @@ def node_functions(system: LinearSystem, compile: bool = True) -> NodeFunctions:
     functions = derive_functions(system)
     patterns = tuple(matrix.sparsity() for matrix in matrices(system))
     compiler = find_compiler() if compile else None
+    interpreted = NodeFunctions(functions, patterns, None)
     if compiler is None:
-        return NodeFunctions(functions, patterns, None)
+        return interpreted
     here = Path(__file__).parent
     digest = hashlib.sha256(repr((system.name, system.parameter_names, [g.names for g in system.tables])).encode())
     for function in functions:
@@ -194,8 +196,26 @@ def node_functions(system: LinearSystem, compile: bool = True) -> NodeFunctions:
             lambda: nodes_source(system, functions),
             compiler,
             dict(system.structure),
-        ).path
+        )
     except CacheError as error:
         log.info("the sensitivities of %s are interpreted: %s", system.name, error)
-        library = None
-    return NodeFunctions(functions, patterns, library)
+        return interpreted
+    compiled = replace(interpreted, library=library.path)
+    if not _difference(compiled, interpreted) <= AGREEMENT:
+        set_aside(library)
+        log.warning("%s differs from the interpreter and was set aside: the interpreter is used", library.path)
+        return interpreted
+    return compiled
+
+
+def _difference(one: NodeFunctions, other: NodeFunctions) -> float:
+    """Return the largest difference at two random points, relative to the largest entry of its result."""
+    random = np.random.default_rng(504)
+    largest = 0.0
+    for which, function in enumerate(one.functions):
+        sizes = [function.numel_in(i) for i in range(function.n_in())]
+        arguments = [random.uniform(0.5, 1.5, size if i == 2 else (2, size)) for i, size in enumerate(sizes)]
+        found, expected = (f._evaluate(which, (arguments[0][:, 0], *arguments[1:])) for f in (one, other))
+        if expected.size:
+            largest = max(largest, float(np.abs(found - expected).max() / max(1e-300, np.abs(expected).max())))
+    return largest

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg.lapack import dgetrf, dgetrs
+from scipy.linalg import get_lapack_funcs
 
 from ..model.errors import IntegrationError
 from ..model.system import LinearSystem
@@ -28,6 +28,7 @@ LIGHT = 0.3  # damping ratio below which a root rings on through the flight
 FIRST_STEP = 5e-4  # s, beside the ends and discontinuities, where filter poles near 100 rad/s leave fast transients
 GROWTH = 0.15  # of the step with distance from there, s/s
 
+_factorise, _solve = get_lapack_funcs(("getrf", "getrs"), dtype=np.float64)
 _R = np.sqrt(15.0)
 NODES = np.array([0.5 - _R / 10, 0.5, 0.5 + _R / 10])
 WEIGHTS = np.array([5.0, 8.0, 5.0]) / 18
@@ -86,9 +87,9 @@ def collocation_grid(system: LinearSystem, groups: Sequence[TableGroup], end: fl
     return Grid(np.concatenate(edges))
 
 
-def longest_step(matrices: Sequence[NDArray[np.float64]]) -> float:
-    """Return the longest step (s) that follows the lightly damped roots of the state matrices."""
-    roots = np.linalg.eigvals(np.stack(matrices)).ravel()
+def longest_step(matrices: NDArray[np.float64]) -> float:
+    """Return the longest step (s) that follows the lightly damped roots of state matrices (k, n, n)."""
+    roots = np.linalg.eigvals(matrices).ravel()
     ringing = np.abs(roots[-roots.real < LIGHT * np.abs(roots)])
     return float(min(STEP, PHASE / max(ringing.max(initial=0.0), PHASE / STEP)))
 
@@ -180,7 +181,7 @@ class Collocation:
         matrices[:, np.arange(3 * n), np.arange(3 * n)] += 1.0
         self._factors = []
         for step, matrix in enumerate(matrices):
-            lu, pivots, info = dgetrf(matrix.T)  # of the transpose, whose memory order LAPACK takes as it is
+            lu, pivots, info = _factorise(matrix.T)  # of the transpose, whose memory order LAPACK takes as it is
             if info != 0:
                 raise IntegrationError(f"the collocation equations are singular at {grid.edges[step]:g} s")
             self._factors.append((lu, pivots))
@@ -203,7 +204,7 @@ class Collocation:
         for step, h in enumerate(self.grid.steps):
             lu, pivots = self._factors[step]
             right = (self._A[step] @ x + forcing[step]).ravel()
-            rates = dgetrs(lu, pivots, right, trans=1)[0].reshape(3, self._n)
+            rates = _solve(lu, pivots, right, trans=1)[0].reshape(3, self._n)
             stages[step] = x + h * (STAGES @ rates)
             x = x + h * (WEIGHTS @ rates)
         return stages, x
@@ -220,7 +221,7 @@ class Collocation:
         for step in reversed(range(self.grid.steps.size)):
             h, (lu, pivots) = self.grid.steps[step], self._factors[step]
             right = np.outer(WEIGHTS, a) + h * STAGES.T @ (WEIGHTS[:, None] * forcing[step])
-            weighted = dgetrs(lu, pivots, right.ravel(), trans=0)[0].reshape(3, self._n)
+            weighted = _solve(lu, pivots, right.ravel(), trans=0)[0].reshape(3, self._n)
             stages[step] = weighted / WEIGHTS[:, None]
             a = a + h * (np.einsum("iab,ia->b", self._A[step], weighted) + WEIGHTS @ forcing[step])
         return stages, a

@@ -55,6 +55,16 @@ class Gradient:
     tables_at_end: NDArray[np.float64]
 
 
+@dataclass(frozen=True, eq=False)
+class _MeanPath:
+    """Derivatives of a variance with respect to the mean: along the flight per second, and at t2."""
+
+    on_states: NDArray[np.float64]
+    on_outputs: NDArray[np.float64]
+    on_states_at_end: NDArray[np.float64]
+    on_outputs_at_end: NDArray[np.float64]
+
+
 class AdjointPair:
     """Adjoint, its product with the covariance, and the mean, for one response, time and set of sources.
 
@@ -160,10 +170,9 @@ class AdjointPair:
                 * functions.quadratic_gradient(end, v_end, p, still, self.dual_at_end[None], selected, self.mask)[0]
             )
             at_start = variance_factor * self._start_gradient(system, p)
-            forcing, on_mean, terminal, on_mean_end = self._mean_path(total[:, n_p:], total_end[n_p:])
-            if forcing is not None:
-                adjoint = adjoint + self.solver.backward(terminal, forcing)[0]
-                on_outputs, on_outputs_end = on_outputs + on_mean, on_outputs_end + on_mean_end
+            path = self._mean_path(total[:, n_p:], total_end[n_p:])
+            adjoint = adjoint + self.solver.backward(path.on_states_at_end, path.on_states)[0]
+            on_outputs, on_outputs_end = on_outputs + path.on_outputs, on_outputs_end + path.on_outputs_at_end
         if adjoint.any() or on_outputs_end.any():
             states = self.states.reshape(-1, n)
             total += functions.linear_gradient(times, v, p, adjoint.reshape(-1, n), states, on_outputs)
@@ -183,27 +192,23 @@ class AdjointPair:
                 found += np.array(ca.Function("start", [system.p], [ca.densify(form)])(p)).ravel()
         return found
 
-    def _mean_path(self, on_tables: NDArray, on_tables_end: NDArray):
-        """Return what dVar/dm puts on the states and outputs of the mean, along the flight and at t2."""
+    def _mean_path(self, on_tables: NDArray, on_tables_end: NDArray) -> _MeanPath:
+        """Move what the variance owes to the tables of the mean response on to the mean's states and outputs."""
         system = self.executable.system
         names = [name for g in self.executable.groups for name in g.names]
-        present = [name for name in MEAN_TABLES if name in names]
-        if not present:
-            return None, None, None, None
         k, n, r = self.grid.steps.size, len(system.states), len(system.outputs)
-        forcing, outputs = np.zeros((k, 3, n)), np.zeros((k * 3, r))
-        terminal, outputs_end = np.zeros(n), np.zeros(r)
-        for name in present:
+        path = _MeanPath(np.zeros((k, 3, n)), np.zeros((k * 3, r)), np.zeros(n), np.zeros(r))
+        for name in (name for name in MEAN_TABLES if name in names):
             (kind, what), column = MEAN_TABLES[name], names.index(name)
-            along = on_tables[:, column]
+            along, last = on_tables[:, column], on_tables_end[column]
             if kind == "output":
                 row = system.output_index(what)
-                outputs[:, row] += along
-                outputs_end[row] += on_tables_end[column]
-                forcing += along.reshape(k, 3, 1) * self.matrices["C"][:, :, row]
-                terminal += on_tables_end[column] * self.at_end["C"][row]
+                path.on_outputs[:, row] += along
+                path.on_outputs_at_end[row] += last
+                path.on_states[:] += along.reshape(k, 3, 1) * self.matrices["C"][:, :, row]
+                path.on_states_at_end[:] += last * self.at_end["C"][row]
             else:
                 state = system.state_names.index(what)
-                forcing[:, :, state] += along.reshape(k, 3)
-                terminal[state] += on_tables_end[column]
-        return forcing, outputs, terminal, outputs_end
+                path.on_states[:, :, state] += along.reshape(k, 3)
+                path.on_states_at_end[state] += last
+        return path
