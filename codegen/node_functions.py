@@ -65,7 +65,7 @@ def derive_functions(system: LinearSystem) -> tuple[ca.Function, ca.Function, ca
     )
     numbers = ca.vertcat(system.p, system.v)
     first = [system.time, system.v, system.p, a, y, c]
-    nonzeros = ca.vertcat(*(matrix.nz[:] for matrix in matrices(system)))
+    nonzeros = ca.vertcat(*(ca.vec(matrix.nz[:]) for matrix in matrices(system)))
     return (
         ca.Function("node_matrices", first[:3], [ca.densify(nonzeros)]),
         ca.Function("quadratic_gradient", [*first, m], [ca.densify(ca.gradient(quadratic, numbers))]),

@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 from ascentwind.codegen.node_functions import node_functions
 from ascentwind.model import LinearSystem, define_system
+from ascentwind.model.assemble import vehicle_tables
 from ascentwind.model.errors import DirectNoiseError, TimeRangeError, UnknownNameError
 from ascentwind.runners import IntegratorOptions, Study
 from ascentwind.runners.adjoint import AdjointSolver
 from ascentwind.runners.collocation import Collocation, CompiledCollocation, Grid
 from ascentwind.runners.sensitivity import StructuralParameterError, UndefinedElasticityWarning, ZeroQuantityError
-from ascentwind.runners.sensitivity_check import central_difference
+from ascentwind.runners.sensitivity_check import _with_row, central_difference
 from ascentwind.runners.sensitivity_gradient import AdjointPair
 from scipy.optimize import minimize_scalar
 
@@ -267,6 +268,26 @@ def test_the_mean_path_against_differences_of_cvodes(as504):
     # the mean is proportional to the mean wind, and the variance to the square of the mean
     expected = 2 * d.attrs["quantity_value"]
     assert d["derivative"].item() == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("table", "argument", "step"),
+    [("altitude", 28.0, 1.0), ("wind_filter.H_1_1", 1500.0, 0.1), ("center_of_gravity", 30.0, 0.05)],
+)
+def test_rows_against_differences_of_the_same_discretisation(as504, table, argument, step):
+    """A row of the altitude moves the rate of climb, and the wind that is met; from wind alone, as above."""
+    d = as504.sensitivity("bending_moment", 30.0, source="wind", quantity="variance")
+    at = int(np.flatnonzero((d["knot_table"].values == table) & (d["knot_argument"].values == argument)).item())
+    row = int(np.sum(d["knot_table"].values[:at] == table))
+
+    def variance(value: float) -> float:
+        groups = vehicle_tables(_with_row(as504.vehicle, table, row, value))
+        executable = as504.executable.with_numbers(groups=groups)
+        return AdjointPair(executable, node_functions(as504.system), 0, 30.0, ("wind",)).variance
+
+    expected = central_difference(variance, float(d["knot_value"][at]), step)
+    assert expected.uncertainty < 1e-6 * abs(expected.derivative)
+    assert d["knot_derivative"][at].item() == pytest.approx(expected.derivative, rel=1e-5)
 
 
 def test_scaling_all_wind_scales_the_variance_by_the_square(at_75):
