@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -78,8 +79,14 @@ def mean_response(
     return MeanResponse(times, np.array(states), np.concatenate(outputs))
 
 
-def with_mean_tables(executable: ExecutableSystem, relative_tolerance: float = TOLERANCE) -> ExecutableSystem:
-    """Return the system with its tables of the mean response filled in, if it has any."""
+def with_mean_tables(
+    executable: ExecutableSystem,
+    respond: Callable[[ExecutableSystem, NDArray[np.float64]], MeanResponse] = mean_response,
+) -> ExecutableSystem:
+    """Return the system with its tables of the mean response filled in, if it has any.
+
+    ``respond`` computes the mean at given times: CVODES, or the sweep's own.
+    """
     system = executable.system
     at = next(
         (i for i, g in enumerate(executable.groups) if g.name == "mean" and set(g.names) == set(MEAN_TABLES)), None
@@ -87,7 +94,7 @@ def with_mean_tables(executable: ExecutableSystem, relative_tolerance: float = T
     if at is None:
         return executable
     group = executable.groups[at]
-    mean = mean_response(executable, group.knots, relative_tolerance)
+    mean = respond(executable, group.knots)
     columns = []
     for name in group.names:
         kind, what = MEAN_TABLES[name]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -19,7 +20,7 @@ from ..model.vehicle import Vehicle
 from ..model.wind_filter import ShapingFilter
 from .adjoint import AdjointSolver
 from .integration import IntegratorOptions
-from .mean_response import with_mean_tables
+from .mean_response import mean_response, with_mean_tables
 from .sensitivity import Request, sensitivity
 from .statistics import COMBINED
 from .table_knots import vehicle_rows
@@ -111,7 +112,7 @@ def check_sensitivity(
 
 
 def _value(executable: ExecutableSystem, request: Request, time: float) -> float:
-    filled = with_mean_tables(executable, TOLERANCE)
+    filled = with_mean_tables(executable, partial(mean_response, relative_tolerance=TOLERANCE))
     run = AdjointSolver(filled, IntegratorOptions(relative_tolerance=TOLERANCE)).run(time)
     columns = [executable.system.sources.index(s) for s in request.sources]
     return request.value(float(run.variance[request.row, columns].sum()), float(run.mean[request.row]))
