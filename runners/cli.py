@@ -1,4 +1,4 @@
-"""The command line: ``ascentwind run``, ``verify``, ``tolerance``, ``inspect``, ``vehicles`` and others."""
+"""The command line: ``ascentwind run``, ``inspect``, ``vehicles`` and others, and how errors end."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Annotated, TextIO
 
 import typer
-from rich.console import Console
 from rich.logging import RichHandler
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from ..model.errors import AscentwindError, AscentwindWarning
+from .cli_checks import sensitivity, tolerance, verify
 from .cli_wind import app as wind_app
+from .terminal import VehicleArgument, console, errors, progress_bar
 
 app = typer.Typer(
     add_completion=False,
@@ -24,10 +24,8 @@ app = typer.Typer(
     help="Response statistics of ascending launch vehicles in a random wind, by the method of adjoint systems.",
 )
 app.add_typer(wind_app, name="wind")
-console = Console()
-errors = Console(stderr=True)
-
-VehicleArgument = Annotated[str, typer.Argument(help="A shipped vehicle ('ascentwind vehicles') or a vehicle folder.")]
+for command in (verify, tolerance, sensitivity):
+    app.command()(command)
 
 
 @app.command()
@@ -56,7 +54,7 @@ def run(
     assert study.vehicle is not None
     end_times = parse_times(times or study.vehicle.file.default_times)
     families = [t for t in study.vehicle.file.weighting_times_s if study.system.start < t <= study.system.end]
-    with _progress() as progress:
+    with progress_bar() as progress:
         task = progress.add_task("end times", total=len(end_times))
         statistics = study.response_statistics(
             end_times,
@@ -86,18 +84,6 @@ def run(
     if study.tables(end_times[-1])["altitude"] > top:
         console.print(f"Above {top / 1000:g} km the wind tables end and their last values are held.", style="dim")
     console.print(f"{len(written)} files in {folder}: {', '.join(p.name for p in written)}", soft_wrap=True)
-
-
-def _progress() -> Progress:
-    return Progress(
-        SpinnerColumn(),
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        console=console,
-        transient=True,
-    )
 
 
 def _print_peaks(statistics) -> None:
@@ -192,123 +178,6 @@ def doctor() -> None:
     for line in verdicts:
         table.add_row(line.what, line.found, "[green]ok[/]" if line.good else f"[yellow]{line.advice}[/]")
     console.print(table)
-
-
-@app.command()
-def verify(
-    vehicle: VehicleArgument,
-    times: Annotated[str, typer.Option(help="End times in s: START:STOP:STEP or T1,T2,...")] = "40,60,75,90",
-    runs: Annotated[int, typer.Option(help="Simulated flights of the ensemble.")] = 500,
-    seed: Annotated[int, typer.Option(help="Of the ensemble's noise.")] = 504,
-    out: Annotated[Path | None, typer.Option(help="Folder for a figure of sample paths; none without it.")] = None,
-) -> None:
-    """The same statistics by independent engines, with a verdict; exit code 1 when they disagree."""
-    from .ensemble import EnsembleOptions
-    from .figures import sample_path_figure, write_figure
-    from .output import prepare_folder
-    from .study import Study
-    from .times import parse_times
-    from .verify import verify as run_verification
-
-    options = EnsembleOptions(runs=runs, seed=seed, paths=min(30, runs) if out else 0)
-    if out:
-        prepare_folder(out)
-    with console.status("loading and preparing code"):
-        study = Study.load(vehicle)
-    end_times = parse_times(times)
-    with console.status("computing with every engine"):
-        found = run_verification(study, end_times, options)
-    _print_verification(found)
-    if out:
-        with console.status("drawing sample paths"):
-            start, last = study.system.start, max(end_times)
-            at = [start + (last - start) * k / 60 for k in range(1, 61)]
-            title = f"{study.system.name}: simulated flights and the adjoint's mean ± 3σ"
-            adjoint = study.response_statistics(at, engine="cvodes")
-            figure = sample_path_figure(found.statistics["ensemble"], adjoint, title)
-        for path in write_figure(figure, out, "sample_paths"):
-            console.print(str(path), soft_wrap=True)
-    console.print(found.verdict(), style="green" if found.agree else "bold red", highlight=False)
-    if not found.agree:
-        raise typer.Exit(1)
-
-
-def _print_verification(found) -> None:
-    from .engines import ENGINES
-    from .figures import display, words
-    from .verify import REFERENCE
-
-    reference, ensemble = found.statistics[REFERENCE], found.statistics["ensemble"]
-    table = Table("time", "response", "source", title="Standard deviations by independent engines")
-    table.add_column(f"σ, {ENGINES[REFERENCE].label}", justify="right")
-    for engine in found.differences:
-        table.add_column(f"{ENGINES[engine].label}, difference", justify="right")
-    table.add_column(f"ensemble of {ensemble.attrs['runs']}", justify="right")
-    table.add_column(f"{ensemble.attrs['confidence']:.0%} interval", justify="right")
-    table.add_column("inside")
-    for k, time in enumerate(reference["time"].values):
-        for r, response in enumerate(reference["response"].values):
-            factor, unit = display(str(reference["unit"].values[r]))
-            for s, source in enumerate(reference["source"].values):
-                low, high, std = (factor * ensemble[n].values[k, r, s] for n in ("std_low", "std_high", "std"))
-                table.add_row(
-                    f"{time:g} s", words(response), words(source),
-                    f"{factor * reference['std'].values[k, r, s]:.5g} {unit}",
-                    *(f"{d[k, r, s]:.1e}" for d in found.differences.values()),
-                    f"{std:.4g}", f"{low:.4g} to {high:.4g}", "yes" if found.inside[k, r, s] else "no",
-                    end_section=s + 1 == reference["source"].size,
-                )  # fmt: skip
-    console.print(table)
-
-
-@app.command()
-def tolerance(
-    vehicle: VehicleArgument,
-    times: Annotated[str, typer.Option(help="End times in s: START:STOP:STEP or T1,T2,...")] = "75",
-    out: Annotated[Path | None, typer.Option(help="Folder for the figure; VEHICLE-tolerance without it.")] = None,
-) -> None:
-    """Error and run time of each engine against tolerance, and the variable that paces the step."""
-    from .figures import tolerance_figure, write_figure
-    from .output import prepare_folder
-    from .study import Study
-    from .times import parse_times
-    from .tolerance import TOLERANCES, measure, pacing
-
-    folder = out or Path(f"{Path(vehicle).name}-tolerance")
-    prepare_folder(folder)
-    end_times = parse_times(times)
-    with console.status("loading and preparing code"):
-        study = Study.load(vehicle)
-    with _progress() as progress:
-        task = progress.add_task("tolerances", total=len(TOLERANCES))
-        measured = measure(study, end_times, progress=lambda _: progress.update(task, advance=1))
-    paces = pacing(study, max(end_times))
-    table = Table("engine", title=f"Largest relative error of a σ, and run time, end times {times} s")
-    for value in TOLERANCES:
-        table.add_column(f"{value:.0e}", justify="right")
-    for engine in dict.fromkeys(m.engine for m in measured):
-        rows = [m for m in measured if m.engine == engine]
-        table.add_row(engine, *(f"{m.error:.0e}  {1e3 * m.seconds:.0f} ms" for m in rows))
-    console.print(table)
-    table = Table("flight time", title="What paces the step of CVODES (Adams, 1e-7)")
-    for column in ("fastest root, rad/s", "in", "limit 2/|root|", "step, functional", "step, Newton"):
-        table.add_column(column, justify="right")
-    for column in ("root with the largest local error", "pacing variable"):
-        table.add_column(column)
-    for pace in paces:
-        table.add_row(
-            f"{pace.begin:.4g} - {pace.end:.4g} s", _root(pace.fastest_root), " and ".join(pace.fastest_states),
-            f"{1e3 * pace.functional_limit:.0f} ms", f"{1e3 * pace.functional_step:.0f} ms",
-            f"{1e3 * pace.newton_step:.0f} ms", _root(pace.accuracy_root), pace.pacing_state,
-        )  # fmt: skip
-    console.print(table)
-    figure = tolerance_figure(measured, paces, f"{study.system.name}: end times {times} s")
-    for path in write_figure(figure, folder, "tolerance"):
-        console.print(str(path), soft_wrap=True)
-
-
-def _root(value: complex) -> str:
-    return f"{value.real:.3g}" if value.imag == 0 else f"{value.real:.3g} ± {value.imag:.3g}j"
 
 
 def main() -> None:

@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 from rich.table import Table
 
+from .terminal import console
+
 app = typer.Typer(no_args_is_help=True, help="Wind statistics, and filters that turn white noise into that wind.")
-console = Console()
 
 Period = Annotated[str, typer.Option(help="Month in English, or annual.")]
 Component = Annotated[str, typer.Option(help="zonal or meridional.")]

@@ -37,7 +37,9 @@ class MeanResponse:
     outputs: NDArray[np.float64]
 
 
-def mean_response(executable: ExecutableSystem, times: NDArray[np.float64]) -> MeanResponse:
+def mean_response(
+    executable: ExecutableSystem, times: NDArray[np.float64], relative_tolerance: float = TOLERANCE
+) -> MeanResponse:
     """Integrate the mean forward.
 
     Parameters
@@ -45,6 +47,7 @@ def mean_response(executable: ExecutableSystem, times: NDArray[np.float64]) -> M
     executable : ExecutableSystem
     times : (k,) array
         Increasing, the first at the start of the system; between two discontinuities they are equidistant.
+    relative_tolerance : float
 
     Raises
     ------
@@ -52,7 +55,7 @@ def mean_response(executable: ExecutableSystem, times: NDArray[np.float64]) -> M
     """
     system = executable.system
     scale = state_scales(system)
-    integrator = Integrator(executable.functions.mean, IntegratorOptions(relative_tolerance=TOLERANCE))
+    integrator = Integrator(executable.functions.mean, IntegratorOptions(relative_tolerance=relative_tolerance))
     states = [np.zeros(len(scale))]
     outputs: list[NDArray] = []
     response = executable.functions.response

@@ -1,40 +1,27 @@
-"""A study: a vehicle (or any linear system) with numbers, and the questions one asks of it."""
+"""A study: the questions one asks of a vehicle, or of any linear system with numbers."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
-from pathlib import Path
+from dataclasses import dataclass
+from typing import Literal
 
-import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
-from ..codegen.compiled import ExecutableSystem, executable_system
-from ..model.assemble import assemble
-from ..model.errors import ParameterValueError, TimeRangeError, UnknownNameError
-from ..model.library import find_vehicle
-from ..model.system import LinearSystem, Parameter
-from ..model.tables import table_values
-from ..model.vehicle import Vehicle, load_vehicle
-from ..model.wind_filter import ShapingFilter
-from ..model.wind_statistics import WindModel
+from ..model.errors import ParameterValueError
 from .adjoint import AdjointSolver
 from .engines import Progress, batch_dataset, compute_statistics
 from .integration import IntegratorOptions
-from .mean_response import with_mean_tables
-from .stability import Root, check_coupling, matrices_at, roots, warn_if_unstable
-from .statistics import ResponseStatistics, weighting_dataset, weighting_family
-from .sweep_engine import SweepOptions, batch, sweep, sweep_of, with_sweep_mean_tables
-from .wind_range import warn_beyond
-from .wind_start import covariance_at
-
-POSITIVE = ("correlation_time", "reference_area")
+from .sensitivity import sensitivity
+from .sensitivity_check import check_sensitivity
+from .stability import warn_if_unstable
+from .statistics import COMBINED, ResponseStatistics, weighting_dataset, weighting_family
+from .study_numbers import StudyNumbers
+from .sweep_engine import SweepOptions, batch, sweep, sweep_of
 
 
 @dataclass(frozen=True, eq=False)
-class Study:
+class Study(StudyNumbers):
     """Response statistics of a system by the method of adjoint systems.
 
     Make one with :meth:`load` (vehicles) or :meth:`from_system` (systems of your own).
@@ -46,122 +33,6 @@ class Study:
     >>> stats = study.response_statistics(times=[75.0])
     >>> sigma = stats.std.sel(response="bending_moment", source="wind", time=75.0)
     """
-
-    executable: ExecutableSystem
-    vehicle: Vehicle | None = None
-
-    @staticmethod
-    def load(vehicle: str | Path, *, compile: bool = True) -> Study:
-        """Load a shipped vehicle by name, or a vehicle folder.
-
-        Parameters
-        ----------
-        vehicle : str or path
-        compile : bool
-            False uses CasADi's interpreter: the same numbers, slower.
-
-        Raises
-        ------
-        UnknownNameError, DataError, SingularCouplingError, CompilerError
-        """
-        return Study.from_vehicle(load_vehicle(find_vehicle(vehicle)), compile=compile)
-
-    @staticmethod
-    def from_vehicle(vehicle: Vehicle, *, compile: bool = True) -> Study:
-        """Assemble a loaded vehicle and prepare its code."""
-        altitude = float(vehicle.tables["altitude"].polynomial(vehicle.start))
-        system = assemble(vehicle, covariance_at(vehicle.wind.shaping_filter, altitude))
-        executable = executable_system(system, compile)
-        check_coupling(executable)
-        return Study(executable, vehicle)
-
-    @staticmethod
-    def from_system(system: LinearSystem, *, compile: bool = True) -> Study:
-        """Prepare the code of a linear system of your own."""
-        return Study(executable_system(system, compile))
-
-    @property
-    def system(self) -> LinearSystem:
-        """The linear system: names of states, noises, outputs, and the symbolic matrices."""
-        return self.executable.system
-
-    @property
-    def parameters(self) -> dict[str, Parameter]:
-        """Every parameter by name, with its present value, unit and meaning."""
-        pairs = zip(self.system.parameters, self.executable.parameters, strict=True)
-        return {p.name: replace(p, value=float(value)) for p, value in pairs}
-
-    def with_parameters(self, changes: Mapping[str, float]) -> Study:
-        """Return a study with other parameter values; nothing is compiled.
-
-        Raises
-        ------
-        UnknownNameError
-            With the nearest parameter name.
-        ParameterValueError
-            For a value that is not finite, or a time or area that is not positive.
-        """
-        return Study(self.executable.with_numbers(parameters=self._parameter_values(changes)), self.vehicle)
-
-    def _parameter_values(self, changes: Mapping[str, float]) -> NDArray[np.float64]:
-        names, values = self.system.parameter_names, self.executable.parameters.copy()
-        for name, value in changes.items():
-            if name not in names:
-                raise UnknownNameError("parameter", name, names)
-            if not np.isfinite(value) or (name.rpartition(".")[2] in POSITIVE and value <= 0):
-                raise ParameterValueError(f"parameter '{name}' cannot be {value:g}; give a finite, sensible number")
-            values[names.index(name)] = float(value)
-        return values
-
-    def with_wind(self, wind: WindModel | ShapingFilter) -> Study:
-        """Return a study of the same vehicle in another wind.
-
-        Parameters
-        ----------
-        wind : WindModel or ShapingFilter
-            A filter alone keeps the vehicle's mean wind.
-
-        Raises
-        ------
-        UnknownNameError
-            If the study has no vehicle.
-
-        Warns
-        -----
-        ExtrapolationWarning
-            The flight leaves the filter's altitudes: its coefficients are held at their last values there.
-        """
-        if self.vehicle is None:
-            raise UnknownNameError("wind of a system of one's own", self.system.name, [])
-        if isinstance(wind, ShapingFilter):
-            wind = WindModel(self.vehicle.wind.mean, wind)
-        warn_beyond(wind.shaping_filter, self.vehicle)
-        study = Study.from_vehicle(replace(self.vehicle, wind=wind), compile=self.executable.library is not None)
-        values = {n: p.value for n, p in self.parameters.items() if n in study.parameters}
-        return study.with_parameters(values)
-
-    @cached_property
-    def with_means(self) -> ExecutableSystem:
-        """The system with its tables of the mean response, which the noise coefficients need, filled in."""
-        if self.executable.library is None:
-            return with_mean_tables(self.executable)
-        return with_sweep_mean_tables(sweep_of(self.system), self.executable)
-
-    def matrices(self, time: float) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-        """Return A (n, n), B (n, n_w), C (n_y, n), D (n_y, n_w) at a time; names are in ``study.system``."""
-        self._check_times([time])
-        m = matrices_at(self.with_means, float(time))
-        return m["A"], m["B"], m["C"], m["D"]
-
-    def roots(self, time: float) -> list[Root]:
-        """Return the eigenvalues of A frozen at a time, slowest first."""
-        self._check_times([time])
-        return roots(self.executable, float(time))
-
-    def tables(self, time: float) -> dict[str, float]:
-        """Return every table value at a time (s) by name."""
-        self._check_times([time])
-        return table_values(self.with_means.groups, float(time))
 
     def response_statistics(
         self,
@@ -314,32 +185,72 @@ class Study:
         history = AdjointSolver(self.with_means, options or IntegratorOptions()).history(float(time), spacing)
         return weighting_dataset(self, float(time), history)
 
-    def _check_spacing(self, spacing: float) -> None:
-        if not spacing > 0:
-            raise TimeRangeError(f"a spacing of {spacing:g} s is not positive")
+    def sensitivity(
+        self,
+        response: str,
+        time: float | Literal["peak"],
+        *,
+        source: str = COMBINED,
+        quantity: str = "std",
+        parameters: Iterable[str] | None = None,
+        elasticity: bool = True,
+    ) -> xr.Dataset:
+        """Return exact derivatives of one number with respect to every parameter, table and table row.
 
-    def _check_times(self, times: list[float]) -> None:
-        if not times:
-            raise TimeRangeError("no end time was given")
-        for time in times:
-            if not np.isfinite(time):
-                raise TimeRangeError(f"{time} is not a time")
-            if time < self.system.start:
-                raise TimeRangeError(
-                    f"end time {time:g} s lies before the start at {self.system.start:g} s; "
-                    "choose a later one or an earlier start_time_s"
-                )
-            if time > self.system.end:
-                raise TimeRangeError(f"end time {time:g} s lies beyond {self._end_of_data()}")
+        Parameters
+        ----------
+        response : str
+        time : float or 'peak'
+            t2, s; 'peak' is the time at which the quantity is largest, located between output times.
+        source : str
+            A noise source, or 'combined'.
+        quantity : {'std', 'variance', 'mean', 'mean_plus_3sigma'}
+        parameters : iterable of str, optional
+            All without it.
+        elasticity : bool
+            False leaves out the derivatives in percent per percent, which a quantity of zero does not have.
 
-    def _end_of_data(self) -> str:
-        end = f"the end of the system at {self.system.end:g} s"
-        if self.vehicle is None:
-            return end
-        shortest = min((s for s in self.vehicle.sources if s.last == self.system.end), key=lambda s: s.name)
-        return f"the last row of {shortest.file.name} at {shortest.last:g} s; extend the table or ask for less"
+        Returns
+        -------
+        xarray.Dataset
+            ``derivative`` and ``elasticity`` (parameter); ``table_derivative`` (table, t) per second of flight, with
+            ``table_derivative_at_end`` (table), the weight of its delta at t2, and ``node_weight`` (t) to integrate
+            with; ``knot_derivative`` (knot) by row; ``wind_sigma_elasticity`` (band) by kilometre of altitude.
 
-    def _responses(self, responses: Iterable[str] | None) -> list[str]:
-        names = list(self.system.output_names if responses is None else dict.fromkeys(responses))
-        self.system.refuse_direct_noise(names)
-        return names
+        Raises
+        ------
+        UnknownNameError, StructuralParameterError, TimeRangeError, DirectNoiseError, ZeroQuantityError
+
+        Warns
+        -----
+        UndefinedElasticityWarning
+            Parameters that are zero; their ``elasticity_defined`` is 0.
+        """
+        return sensitivity(self, response, time, source, quantity, parameters, elasticity)
+
+    def check_sensitivity(
+        self,
+        response: str,
+        time: float | Literal["peak"],
+        *,
+        source: str = COMBINED,
+        quantity: str = "std",
+        parameters: Iterable[str] | None = None,
+        rows: int = 0,
+    ) -> xr.Dataset:
+        """Compare :meth:`sensitivity` with central differences of CVODES at a tolerance of 1e-12.
+
+        Parameters
+        ----------
+        response, time, source, quantity, parameters
+            As there.
+        rows : int
+            Of how many tables the row with the largest elasticity is checked too.
+
+        Returns
+        -------
+        xarray.Dataset
+            Over (item): ``derivative``, ``difference``, its ``uncertainty``, how far they are ``apart`` and whether
+            the sensitivity ``agrees`` to 1e-5 and the uncertainty.
+        """
+        return check_sensitivity(self, response, time, source, quantity, parameters, rows)

@@ -1,6 +1,8 @@
-"""End times written as text: 'start:stop:step' or 'a,b,c', in seconds."""
+"""End times written as text: 'start:stop:step' or 'a,b,c' in seconds, or 'peak'."""
 
 from __future__ import annotations
+
+from typing import Literal
 
 import numpy as np
 
@@ -31,3 +33,18 @@ def parse_times(text: str) -> list[float]:
     if (stop - start) / step > MOST:
         raise TimeRangeError(f"'{text}' names more than {MOST} times; take a larger step")
     return [float(t) for t in start + step * np.arange(int(np.floor((stop - start) / step + 1e-9)) + 1)]
+
+
+def parse_time_or_peak(text: str) -> float | Literal["peak"]:
+    """Return a time in seconds, or 'peak'.
+
+    Raises
+    ------
+    TimeRangeError
+    """
+    if text == "peak":
+        return "peak"
+    try:
+        return float(text)
+    except ValueError:
+        raise TimeRangeError(f"'{text}' is not a time; give seconds or 'peak'") from None

@@ -53,6 +53,24 @@ def test_run_writes_tables_and_figures(ascentwind, tmp_path, as504):
     assert sorted(p.suffix for p in (tmp_path / "found").iterdir()) == sorted([".nc", ".csv"] + 4 * [".png", ".svg"])
 
 
+def test_sensitivity_ranks_and_writes(ascentwind, tmp_path, as504):
+    printed = ascentwind("sensitivity", "as504", "--time", "40", "--quantity", "std", "--out", "found")
+    expected = as504.sensitivity("bending_moment", 40.0)
+    e = expected["elasticity"].to_series()
+    first = e.abs().idxmax()
+    assert re.search(rf"parameter.*\n.*\n. {re.escape(first)} ", printed)
+    assert f"{e[first]:+.4f}" in printed
+    rows = list(csv.reader((tmp_path / "found" / "sensitivity.csv").open()))
+    stored = {row[1]: float(row[5]) for row in rows if row[0] == "parameter"}
+    assert stored == pytest.approx(e.to_dict(), rel=1e-8)
+    assert {row[0] for row in rows[1:]} == {"parameter", "table", "row", "kilometre"}
+    with xr.open_dataset(tmp_path / "found" / "sensitivity.nc", engine="scipy") as dataset:
+        np.testing.assert_allclose(dataset["knot_derivative"], expected["knot_derivative"], rtol=1e-9, atol=1e-12)
+        assert dataset.attrs["t2_s"] == 40.0
+    for name in ("tornado", "over_time", "over_altitude"):
+        assert (tmp_path / "found" / f"sensitivity_{name}.png").read_bytes().startswith(b"\x89PNG")
+
+
 def test_inspect_as_json_is_what_the_study_says(ascentwind, as504):
     found = json.loads(ascentwind("inspect", "as504", "--time", "75", "--json"))
     A, B, C, D = as504.matrices(75.0)

@@ -1,0 +1,300 @@
+"""Sensitivities: which parameter, which second of which table and which kilometre of wind drives a response."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from ..codegen.node_functions import node_functions
+from ..model.errors import AscentwindError, AscentwindWarning, TimeRangeError, UnknownNameError
+from ..model.system import LinearSystem
+from ..model.tables import TableGroup
+from .sensitivity_gradient import AdjointPair, Gradient
+from .sensitivity_peak import peak_time
+from .stability import warn_if_unstable
+from .statistics import COMBINED, provenance
+from .table_knots import knot_sensitivities
+
+if TYPE_CHECKING:
+    from .study import Study
+
+Quantity = Literal["std", "variance", "mean", "mean_plus_3sigma"]
+QUANTITIES: tuple[str, ...] = ("std", "variance", "mean", "mean_plus_3sigma")
+BAND = 1000.0  # m, of altitude
+WIND_MEAN = "wind.mean"
+WIND_OUTPUT = "wind_filter.H_"  # tables that a relative change of the wind's sigma multiplies
+STRUCTURAL = re.compile(r"(count|number|order|modes?|tanks?|masses|sources?|states?|loads?|outputs?)$")
+
+
+class ZeroQuantityError(AscentwindError):
+    """A derivative or elasticity was asked for of a quantity that is zero, where it is not defined."""
+
+
+class StructuralParameterError(UnknownNameError):
+    """A derivative was asked for with respect to something that changes the equations, not a number in them."""
+
+    def __init__(self, name: str):
+        self.kind, self.name, self.known = "parameter", name, ()
+        Exception.__init__(
+            self,
+            f"'{name}' is structure, not a number: another value makes other equations, which have no derivative; "
+            "edit the vehicle file and compare the two vehicles",
+        )
+
+
+class UndefinedElasticityWarning(AscentwindWarning):
+    """Parameters that are zero have a derivative but no elasticity."""
+
+
+@dataclass(frozen=True)
+class Request:
+    """What a sensitivity is asked of.
+
+    Parameters
+    ----------
+    response, source, quantity : str
+    row : int
+        Of the response in C.
+    sources : tuple of str
+        Those that ``source`` stands for.
+    """
+
+    response: str
+    source: str
+    quantity: str
+    row: int
+    sources: tuple[str, ...]
+
+    @staticmethod
+    def of(study: Study, response: str, source: str, quantity: str) -> Request:
+        """Check names.
+
+        Raises
+        ------
+        UnknownNameError, DirectNoiseError
+        """
+        (response,) = study._responses([response])
+        system = study.system
+        if source not in (*system.sources, COMBINED):
+            raise UnknownNameError("noise source", source, (*system.sources, COMBINED))
+        if quantity not in QUANTITIES:
+            raise UnknownNameError("quantity", quantity, QUANTITIES)
+        sources = system.sources if source == COMBINED else (source,)
+        return Request(response, source, quantity, system.output_index(response), sources)
+
+    def pair(self, study: Study, time: float) -> AdjointPair:
+        functions = node_functions(study.system, study.executable.library is not None)
+        return AdjointPair(study.with_means, functions, self.row, time, self.sources)
+
+    def factors(self, pair: AdjointPair) -> tuple[float, float]:
+        """Return dQ/dVar and dQ/dmean.
+
+        Raises
+        ------
+        ZeroQuantityError
+            Where the variance is zero and the quantity holds its root.
+        """
+        if self.quantity in ("variance", "mean"):
+            return (1.0, 0.0) if self.quantity == "variance" else (0.0, 1.0)
+        if not pair.variance > 0:
+            raise ZeroQuantityError(
+                f"the variance of '{self.response}' from '{self.source}' is zero at {pair.time:g} s, where its root "
+                "has no derivative; ask for quantity 'variance', or for a source with a sigma above zero"
+            )
+        root = 0.5 / np.sqrt(pair.variance)
+        return (root, 0.0) if self.quantity == "std" else (3 * root, 1.0)
+
+    def value(self, variance: float, mean: float) -> float:
+        """Return the quantity."""
+        std = float(np.sqrt(max(variance, 0.0)))
+        return {"std": std, "variance": variance, "mean": mean, "mean_plus_3sigma": mean + 3 * std}[self.quantity]
+
+
+def sensitivity(
+    study: Study,
+    response: str,
+    time: float | Literal["peak"],
+    source: str = COMBINED,
+    quantity: str = "std",
+    parameters: Iterable[str] | None = None,
+    elasticity: bool = True,
+) -> xr.Dataset:
+    """See :meth:`Study.sensitivity`."""
+    request = Request.of(study, response, source, quantity)
+    rows = _parameter_rows(study.system, parameters)
+    at_peak = isinstance(time, str)
+    if isinstance(time, str):
+        if time != "peak":
+            raise TimeRangeError(f"'{time}' is not a time; give seconds or 'peak'")
+        time, at_end = peak_time(study, request)
+    else:
+        time, at_end = float(time), False
+    study._check_times([time])
+    if time <= study.system.start:
+        raise TimeRangeError(f"at its start, {time:g} s, a system has no history to differentiate; choose a later time")
+    warn_if_unstable(study.executable, time)
+    pair = request.pair(study, time)
+    gradient = pair.gradient(*request.factors(pair))
+    value = request.value(pair.variance, pair.mean)
+    if elasticity and value == 0:
+        raise ZeroQuantityError(
+            f"the {quantity} of '{response}' from '{source}' is zero at {time:g} s, so that a derivative in percent is "
+            "not defined; pass elasticity=False for derivatives alone"
+        )
+    dataset = _parameters_dataset(study, gradient, rows, value, elasticity)
+    if any(g.name != "mean" for g in study.system.tables):
+        dataset = dataset.merge(_tables_dataset(study, pair, gradient, value, elasticity))
+        knots = knot_sensitivities(study, pair, gradient)
+        if knots is not None:
+            if elasticity:
+                knots["knot_elasticity"] = knots["knot_derivative"] * knots["knot_value"] / value
+                knots["knot_elasticity"].attrs = {"units": "1", "long_name": "percent per percent of the knot's value"}
+            dataset = dataset.merge(knots)
+    dataset.attrs = provenance(study) | {
+        "response": response,
+        "response_unit": study.system.outputs[request.row].unit,
+        "source": source,
+        "quantity": quantity,
+        "t2_s": time,
+        "value": value,
+        "variance": pair.variance,
+        "mean": pair.mean,
+        "at_peak": int(at_peak),
+        "peak_at_end_of_range": int(at_end),
+        "engine": "collocation, Gauss-Legendre of order 6",
+        "steps": pair.grid.steps.size,
+    }
+    return dataset
+
+
+def _parameter_rows(system: LinearSystem, wanted: Iterable[str] | None) -> list[int]:
+    names = system.parameter_names
+    if wanted is None:
+        return list(range(len(names)))
+    rows = []
+    for name in dict.fromkeys(wanted):
+        if name not in names:
+            if name in system.structure or STRUCTURAL.search(name):
+                raise StructuralParameterError(name)
+            raise UnknownNameError("parameter", name, names)
+        rows.append(names.index(name))
+    return rows
+
+
+def _parameters_dataset(
+    study: Study, gradient: Gradient, rows: list[int], value: float, elasticity: bool
+) -> xr.Dataset:
+    names = [study.system.parameter_names[i] for i in rows]
+    numbers, derivative = study.executable.parameters[rows], gradient.parameters[rows]
+    dataset = xr.Dataset(
+        {
+            "parameter_value": ("parameter", numbers, {"long_name": "present value"}),
+            "derivative": ("parameter", derivative, {"long_name": "derivative, response unit per parameter unit"}),
+        },
+        {
+            "parameter": names,
+            "parameter_unit": ("parameter", [study.system.parameters[i].unit for i in rows]),
+            "description": ("parameter", [study.system.parameters[i].description for i in rows]),
+        },
+    )
+    if elasticity:
+        zero = numbers == 0
+        if zero.any():
+            listed = ", ".join(np.array(names)[zero])
+            warnings.warn(
+                UndefinedElasticityWarning(
+                    f"{listed}: zero, so that a change in percent is none; see the derivative instead"
+                ),
+                stacklevel=4,
+            )
+        dataset["elasticity"] = ("parameter", derivative * numbers / value, {"units": "1"})
+        dataset["elasticity"].attrs["long_name"] = "percent of the quantity per percent of the parameter"
+        dataset["elasticity_defined"] = ("parameter", (~zero).astype(np.int8))
+    return dataset
+
+
+def _tables_dataset(study: Study, pair: AdjointPair, gradient: Gradient, value: float, elasticity: bool) -> xr.Dataset:
+    groups = study.with_means.groups
+    names = [n for g in groups for n in g.names]
+    units = [u for g in groups for u in g.units]
+    columns = [names.index(n) for g in groups if g.name != "mean" for n in g.names]
+    values, values_at_end = pair.tables, pair.tables_at_end
+    density = total_density(groups, values, gradient.tables)
+    at_end = total_density(groups, values_at_end[None], gradient.tables_at_end[None])[0]
+    dataset = xr.Dataset(
+        {
+            "table_value": (("table", "t"), values[:, columns].T),
+            "table_derivative": (("table", "t"), density[:, columns].T),
+            "table_derivative_at_end": ("table", at_end[columns]),
+            "node_weight": ("t", gradient.weights, {"units": "s", "long_name": "quadrature weight of a time"}),
+        },
+        {
+            "table": [names[c] for c in columns],
+            "table_unit": ("table", [units[c] for c in columns]),
+            "t": ("t", gradient.times, {"units": "s", "long_name": "flight time"}),
+        },
+    )
+    dataset["table_derivative"].attrs = {
+        "long_name": "derivative with respect to the table's value at a time, response unit per table unit and second"
+    }
+    dataset["table_derivative_at_end"].attrs = {"long_name": "weight of the delta at t2, response unit per table unit"}
+    if elasticity:
+        relative = (gradient.weights @ (density * values) + at_end * values_at_end) / value
+        dataset["table_elasticity"] = ("table", relative[columns], {"units": "1"})
+        dataset["table_elasticity"].attrs["long_name"] = "percent per percent of the whole table, others held"
+    over = next((g.argument for g in groups if g.argument != "time"), None)
+    if over is not None:
+        at = values[:, names.index(over)]
+        dataset[over] = ("t", at, {"units": units[names.index(over)], "long_name": f"{over} at a time"})
+        if elasticity:
+            relative, last = gradient.weights[:, None] * density * values / value, at_end * values_at_end / value
+            for label, what, chosen in (
+                ("wind_sigma_elasticity", "the wind's sigma", [n for n in names if n.startswith(WIND_OUTPUT)]),
+                ("wind_mean_elasticity", "the mean wind", [n for n in names if n == WIND_MEAN]),
+            ):
+                if chosen:
+                    rows = [names.index(n) for n in chosen]
+                    end = (float(values_at_end[names.index(over)]), float(last[rows].sum()))
+                    dataset = dataset.merge(_bands(label, what, at, relative[:, rows].sum(axis=1), *end))
+    return dataset
+
+
+def _bands(
+    label: str, what: str, altitude: NDArray, share: NDArray, altitude_at_end: float, share_at_end: float
+) -> xr.Dataset:
+    """Return the elasticity to a quantity over altitude in each kilometre."""
+    edges = BAND * np.arange(np.floor(altitude.min() / BAND), np.floor(altitude.max() / BAND) + 2)
+    found = np.histogram(altitude, edges, weights=share)[0]
+    found[min(int((altitude_at_end - edges[0]) / BAND), found.size - 1)] += share_at_end
+    return xr.Dataset(
+        {label: ("band", found, {"units": "1", "long_name": f"percent per percent of {what} in that kilometre"})},
+        {"band": ("band", edges[:-1] + BAND / 2, {"units": "m", "long_name": "middle of a kilometre of altitude"})},
+    )
+
+
+def total_density(groups: tuple[TableGroup, ...], values: NDArray, density: NDArray) -> NDArray[np.float64]:
+    """Return densities in which the argument of a group (altitude) carries what it does through that group."""
+    names = [n for g in groups for n in g.names]
+    total = density.copy()
+    first = 0
+    for group in groups:
+        if group.argument != "time":
+            at = names.index(group.argument)
+            slope = _slopes(group, values[:, at])
+            total[:, at] += np.sum(density[:, first : first + len(group.names)] * slope, axis=1)
+        first += len(group.names)
+    return total
+
+
+def _slopes(group: TableGroup, argument: NDArray) -> NDArray[np.float64]:
+    c = group.coefficients
+    powers = np.stack([c[:, 1], 2 * c[:, 2], 3 * c[:, 3], np.zeros_like(c[:, 0])], axis=1)
+    inside = (argument >= group.knots[0]) & (argument <= group.knots[-1])
+    return replace(group, coefficients=powers).evaluate(argument) * inside[:, None]

@@ -1,0 +1,66 @@
+"""The time of the peak, between output times: where the derivative of the quantity with respect to t2 vanishes.
+
+At the peak the derivative of the maximum is the derivative at that time held fixed (envelope theorem).
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.optimize import root_scalar
+
+from ..model.errors import TimeRangeError
+from .times import parse_times
+
+if TYPE_CHECKING:
+    from .sensitivity import Request
+    from .study import Study
+
+SCAN_POINTS = 40
+TIME_TOLERANCE = 1e-6  # s
+
+
+def peak_time(study: Study, request: Request) -> tuple[float, bool]:
+    """Return the time of the largest value of a quantity, and whether it is an end of the range searched.
+
+    The range is a vehicle's ``default_times``, or start to end of a system of your own.
+
+    Raises
+    ------
+    TimeRangeError
+        If the system has no end.
+    """
+    times = _range(study)
+    scan = study.response_statistics(times, responses=[request.response])
+    values = scan[request.quantity].sel(source=request.source).values[:, 0]
+    best = int(np.argmax(values))
+    low, high = times[max(best - 1, 0)], times[min(best + 1, len(times) - 1)]
+
+    @lru_cache
+    def quantity(time: float) -> tuple[float, float]:
+        pair = request.pair(study, time)
+        on_variance, on_mean = request.factors(pair)
+        variance, mean = pair.slopes
+        return request.value(pair.variance, pair.mean), on_variance * variance + on_mean * mean
+
+    candidates = [times[best]]
+    edges = [low, *(d for d in study.system.discontinuities if low < d < high), high]
+    for a, b in pairwise(edges):
+        a = float(np.nextafter(a, np.inf)) if a in study.system.discontinuities else a
+        candidates += [t for t in (a, b) if t in edges[1:-1]]
+        if quantity(a)[1] > 0 > quantity(b)[1]:
+            candidates.append(float(root_scalar(lambda t: quantity(t)[1], bracket=(a, b), xtol=TIME_TOLERANCE).root))
+    found = max(candidates, key=lambda t: quantity(t)[0])
+    return found, found in (times[0], times[-1])
+
+
+def _range(study: Study) -> list[float]:
+    start, end = study.system.start, study.system.end
+    if study.vehicle is not None:
+        return [t for t in parse_times(study.vehicle.file.default_times) if start < t <= end]
+    if not np.isfinite(end):
+        raise TimeRangeError(f"system '{study.system.name}' has no end to search for a peak; give a time in seconds")
+    return np.linspace(start, end, SCAN_POINTS + 1)[1:].tolist()

@@ -1,0 +1,187 @@
+"""What a study holds: a vehicle or system with its numbers, and what follows from them at one time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..codegen.compiled import ExecutableSystem, executable_system
+from ..model.assemble import assemble
+from ..model.errors import ParameterValueError, TimeRangeError, UnknownNameError
+from ..model.library import find_vehicle
+from ..model.system import LinearSystem, Parameter
+from ..model.tables import table_values
+from ..model.vehicle import Vehicle, load_vehicle
+from ..model.wind_filter import ShapingFilter
+from ..model.wind_statistics import WindModel
+from .mean_response import with_mean_tables
+from .stability import Root, check_coupling, matrices_at, roots
+from .sweep_engine import sweep_of, with_sweep_mean_tables
+from .wind_range import warn_beyond
+from .wind_start import covariance_at
+
+POSITIVE = ("correlation_time", "reference_area")
+
+
+@dataclass(frozen=True, eq=False)
+class StudyNumbers:
+    """A system with numbers; :class:`~ascentwind.runners.Study` asks the questions.
+
+    Attributes
+    ----------
+    executable : ExecutableSystem
+    vehicle : Vehicle or None
+        None for a system of one's own.
+    """
+
+    executable: ExecutableSystem
+    vehicle: Vehicle | None = None
+
+    @classmethod
+    def load(cls, vehicle: str | Path, *, compile: bool = True) -> Self:
+        """Load a shipped vehicle by name, or a vehicle folder.
+
+        Parameters
+        ----------
+        vehicle : str or path
+        compile : bool
+            False uses CasADi's interpreter: the same numbers, slower.
+
+        Raises
+        ------
+        UnknownNameError, DataError, SingularCouplingError, CompilerError
+        """
+        return cls.from_vehicle(load_vehicle(find_vehicle(vehicle)), compile=compile)
+
+    @classmethod
+    def from_vehicle(cls, vehicle: Vehicle, *, compile: bool = True) -> Self:
+        """Assemble a loaded vehicle and prepare its code."""
+        altitude = float(vehicle.tables["altitude"].polynomial(vehicle.start))
+        system = assemble(vehicle, covariance_at(vehicle.wind.shaping_filter, altitude))
+        executable = executable_system(system, compile)
+        check_coupling(executable)
+        return cls(executable, vehicle)
+
+    @classmethod
+    def from_system(cls, system: LinearSystem, *, compile: bool = True) -> Self:
+        """Prepare the code of a linear system of your own."""
+        return cls(executable_system(system, compile))
+
+    @property
+    def system(self) -> LinearSystem:
+        """The linear system: names of states, noises, outputs, and the symbolic matrices."""
+        return self.executable.system
+
+    @property
+    def parameters(self) -> dict[str, Parameter]:
+        """Every parameter by name, with its present value, unit and meaning."""
+        pairs = zip(self.system.parameters, self.executable.parameters, strict=True)
+        return {p.name: replace(p, value=float(value)) for p, value in pairs}
+
+    def with_parameters(self, changes: Mapping[str, float]) -> Self:
+        """Return a study with other parameter values; nothing is compiled.
+
+        Raises
+        ------
+        UnknownNameError
+            With the nearest parameter name.
+        ParameterValueError
+            For a value that is not finite, or a time or area that is not positive.
+        """
+        return type(self)(self.executable.with_numbers(parameters=self._parameter_values(changes)), self.vehicle)
+
+    def _parameter_values(self, changes: Mapping[str, float]) -> NDArray[np.float64]:
+        names, values = self.system.parameter_names, self.executable.parameters.copy()
+        for name, value in changes.items():
+            if name not in names:
+                raise UnknownNameError("parameter", name, names)
+            if not np.isfinite(value) or (name.rpartition(".")[2] in POSITIVE and value <= 0):
+                raise ParameterValueError(f"parameter '{name}' cannot be {value:g}; give a finite, sensible number")
+            values[names.index(name)] = float(value)
+        return values
+
+    def with_wind(self, wind: WindModel | ShapingFilter) -> Self:
+        """Return a study of the same vehicle in another wind.
+
+        Parameters
+        ----------
+        wind : WindModel or ShapingFilter
+            A filter alone keeps the vehicle's mean wind.
+
+        Raises
+        ------
+        UnknownNameError
+            If the study has no vehicle.
+
+        Warns
+        -----
+        ExtrapolationWarning
+            The flight leaves the filter's altitudes: its coefficients are held at their last values there.
+        """
+        if self.vehicle is None:
+            raise UnknownNameError("wind of a system of one's own", self.system.name, [])
+        if isinstance(wind, ShapingFilter):
+            wind = WindModel(self.vehicle.wind.mean, wind)
+        warn_beyond(wind.shaping_filter, self.vehicle)
+        study = self.from_vehicle(replace(self.vehicle, wind=wind), compile=self.executable.library is not None)
+        values = {n: p.value for n, p in self.parameters.items() if n in study.parameters}
+        return study.with_parameters(values)
+
+    @cached_property
+    def with_means(self) -> ExecutableSystem:
+        """The system with its tables of the mean response, which the noise coefficients need, filled in."""
+        if self.executable.library is None:
+            return with_mean_tables(self.executable)
+        return with_sweep_mean_tables(sweep_of(self.system), self.executable)
+
+    def matrices(self, time: float) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+        """Return A (n, n), B (n, n_w), C (n_y, n), D (n_y, n_w) at a time; names are in ``study.system``."""
+        self._check_times([time])
+        m = matrices_at(self.with_means, float(time))
+        return m["A"], m["B"], m["C"], m["D"]
+
+    def roots(self, time: float) -> list[Root]:
+        """Return the eigenvalues of A frozen at a time, slowest first."""
+        self._check_times([time])
+        return roots(self.executable, float(time))
+
+    def tables(self, time: float) -> dict[str, float]:
+        """Return every table value at a time (s) by name."""
+        self._check_times([time])
+        return table_values(self.with_means.groups, float(time))
+
+    def _check_spacing(self, spacing: float) -> None:
+        if not spacing > 0:
+            raise TimeRangeError(f"a spacing of {spacing:g} s is not positive")
+
+    def _check_times(self, times: list[float]) -> None:
+        if not times:
+            raise TimeRangeError("no end time was given")
+        for time in times:
+            if not np.isfinite(time):
+                raise TimeRangeError(f"{time} is not a time")
+            if time < self.system.start:
+                raise TimeRangeError(
+                    f"end time {time:g} s lies before the start at {self.system.start:g} s; "
+                    "choose a later one or an earlier start_time_s"
+                )
+            if time > self.system.end:
+                raise TimeRangeError(f"end time {time:g} s lies beyond {self._end_of_data()}")
+
+    def _end_of_data(self) -> str:
+        end = f"the end of the system at {self.system.end:g} s"
+        if self.vehicle is None:
+            return end
+        shortest = min((s for s in self.vehicle.sources if s.last == self.system.end), key=lambda s: s.name)
+        return f"the last row of {shortest.file.name} at {shortest.last:g} s; extend the table or ask for less"
+
+    def _responses(self, responses: Iterable[str] | None) -> list[str]:
+        names = list(self.system.output_names if responses is None else dict.fromkeys(responses))
+        self.system.refuse_direct_noise(names)
+        return names
