@@ -37,7 +37,7 @@ class ExecutableSystem:
     ----------
     system : LinearSystem
     core : CoreFunctions
-    library : CompiledLibrary or None
+    shared_library : CompiledLibrary or None
         None when the interpreter is used.
     groups : tuple of TableGroup
         The tables in force; their shapes are the system's.
@@ -47,7 +47,7 @@ class ExecutableSystem:
 
     system: LinearSystem
     core: CoreFunctions
-    library: CompiledLibrary | None
+    shared_library: CompiledLibrary | None
     groups: tuple[TableGroup, ...]
     parameters: NDArray[np.float64]
 
@@ -58,13 +58,13 @@ class ExecutableSystem:
 
     @property
     def engine(self) -> str:
-        return "interpreter" if self.library is None else "compiled"
+        return "interpreter" if self.shared_library is None else "compiled"
 
     @cached_property
     def functions(self) -> SystemFunctions:
-        if self.library is None:
+        if self.shared_library is None:
             return interpreted_functions(self.system, self.core, self.groups)
-        path = str(self.library.path)
+        path = str(self.shared_library.path)
         return SystemFunctions(*(ca.external(name, path) for name in ("matrices", "adjoint", "mean", "response")))
 
     @property
@@ -126,7 +126,7 @@ def executable_system(system: LinearSystem, compile: bool = True) -> ExecutableS
     except CacheError as error:
         _say_once(f"compiled code is not used: {error}")
         return interpreted
-    compiled = replace(interpreted, library=library)
+    compiled = replace(interpreted, shared_library=library)
     difference = difference_from_core(compiled)
     if not difference <= AGREEMENT:
         set_aside(library)

@@ -51,11 +51,11 @@ class Steps:
 class CompiledEnsemble:
     """The ensemble of one size of system; calls from several threads do not disturb each other."""
 
-    library: CompiledLibrary
+    shared_library: CompiledLibrary
 
     @cached_property
     def _handle(self) -> ctypes.CDLL:
-        return ctypes.CDLL(str(self.library.path))
+        return ctypes.CDLL(str(self.shared_library.path))
 
     def run(
         self, steps: Steps, seed: int, first: int, runs: int, keep_paths: bool

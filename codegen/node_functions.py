@@ -111,12 +111,12 @@ class NodeFunctions:
         Nonzeros of the matrices, gradient of the quadratic and of the linear form.
     patterns : tuple of Sparsity
         Of A, B, C, E, G and the known inputs.
-    library : Path or None
+    shared_library : Path or None
     """
 
     functions: tuple[ca.Function, ca.Function, ca.Function]
     patterns: tuple[ca.Sparsity, ...]
-    library: Path | None
+    shared_library: Path | None
 
     def matrices(self, t: NDArray, v: NDArray, p: NDArray) -> dict[str, NDArray[np.float64]]:
         """Return A, B, C, E, G and the known inputs at k points, each (k, rows, columns).
@@ -152,14 +152,14 @@ class NodeFunctions:
     def _evaluate(self, which: int, arguments: tuple[NDArray[np.float64], ...]) -> NDArray[np.float64]:
         function, count = self.functions[which], arguments[0].size
         arrays = [np.ascontiguousarray(x, float) for x in arguments]
-        if self.library is None:
+        if self.shared_library is None:
             columns = [
                 x[None, :] if i == 0 else np.tile(x[:, None], count) if x.ndim == 1 else x.T
                 for i, x in enumerate(arrays)
             ]
             return function.map(count)(*columns).full().T
         found = np.empty((count, function.numel_out(0)))
-        call = getattr(ctypes.CDLL(str(self.library)), function.name())
+        call = getattr(ctypes.CDLL(str(self.shared_library)), function.name())
         call.restype = None
         pointers = [x.ctypes.data_as(_POINTER) for x in arrays]
         strides = [1, *(0 if x.ndim == 1 else x.shape[1] for x in arrays[1:])]
@@ -200,7 +200,7 @@ def node_functions(system: LinearSystem, compile: bool = True) -> NodeFunctions:
     except CacheError as error:
         log.info("the sensitivities of %s are interpreted: %s", system.name, error)
         return interpreted
-    compiled = replace(interpreted, library=library.path)
+    compiled = replace(interpreted, shared_library=library.path)
     if not _difference(compiled, interpreted) <= AGREEMENT:
         set_aside(library)
         log.warning("%s differs from the interpreter and was set aside: the interpreter is used", library.path)

@@ -71,11 +71,11 @@ class CompiledSweep:
 
     system: LinearSystem
     functions: SweepFunctions
-    library: CompiledLibrary
+    shared_library: CompiledLibrary
 
     @cached_property
     def _handle(self) -> ctypes.CDLL:
-        return ctypes.CDLL(str(self.library.path))
+        return ctypes.CDLL(str(self.shared_library.path))
 
     def run(
         self, executable: ExecutableSystem, segments: Segments, tolerance: float, transition: bool = False

@@ -113,7 +113,7 @@ def _print_peaks(statistics) -> None:
 @app.command()
 def vehicles() -> None:
     """The vehicles that ship with ascentwind."""
-    from ..model.library import built_in_vehicles
+    from ..model.shipped import built_in_vehicles
     from ..model.vehicle import load_vehicle
 
     table = Table("name", "what", "times (s)", "folder")

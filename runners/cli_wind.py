@@ -139,7 +139,7 @@ def plot(
     """Figures after the report's 3-7 to 3-16 and A1."""
     import numpy as np
 
-    from ..model.library import find_vehicle
+    from ..model.shipped import find_vehicle
     from ..model.vehicle import load_vehicle
     from ..model.wind_filter_file import read_filter
     from .analytic_fits import fit_deviation

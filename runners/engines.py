@@ -84,7 +84,7 @@ def default_engine(study: Study, options: object | None) -> str:
     """Return the engine that options belong to; without any the sweep, or CVODES where nothing is compiled."""
     if options is not None:
         return next((name for name, e in ENGINES.items() if isinstance(options, e.options)), "sweep")
-    return "cvodes" if study.executable.library is None else "sweep"
+    return "cvodes" if study.executable.shared_library is None else "sweep"
 
 
 def compute_statistics(

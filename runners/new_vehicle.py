@@ -8,7 +8,7 @@ import tempfile
 from pathlib import Path
 
 from ..model.errors import OutputFolderError
-from ..model.library import find_vehicle
+from ..model.shipped import find_vehicle
 from ..model.vehicle import VEHICLE_FILE, load_vehicle
 
 

@@ -90,7 +90,7 @@ class Request:
         return Request(response, source, quantity, system.output_index(response), sources)
 
     def pair(self, study: Study, time: float) -> AdjointPair:
-        functions = node_functions(study.system, study.executable.library is not None)
+        functions = node_functions(study.system, study.executable.shared_library is not None)
         return AdjointPair(study.with_means, functions, self.row, time, self.sources)
 
     def factors(self, pair: AdjointPair) -> tuple[float, float]:

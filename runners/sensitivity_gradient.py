@@ -108,7 +108,7 @@ class AdjointPair:
         self.tables = tables_at(executable.groups, times)
         flat = functions.matrices(times, self.tables, executable.parameters)
         self.matrices = {name: value.reshape(*shape, *value.shape[1:]) for name, value in flat.items()}
-        self.solver = collocation(self.grid, self.matrices["A"], functions.library)
+        self.solver = collocation(self.grid, self.matrices["A"], functions.shared_library)
 
         self.adjoint, self.adjoint_at_start = self.solver.backward(
             self.at_end["C"][response], np.zeros((*shape, len(system.states)))

@@ -179,7 +179,7 @@ def provenance(study: Study) -> dict[str, object]:
         "start_time_s": system.start,
         "structure": "; ".join(f"{k}: {v}" for k, v in system.structure.items()),
         "data_sha256": data_hash(study),
-        "code_key": executable.library.key if executable.library else "interpreter",
+        "code_key": executable.shared_library.key if executable.shared_library else "interpreter",
         "changed_parameters": "; ".join(changed) or "none",
         "ascentwind": version("ascentwind"),
         "casadi": ca.CasadiMeta.version(),

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..codegen.compiled import ExecutableSystem, executable_system
 from ..model.assemble import assemble
 from ..model.errors import ParameterValueError, TimeRangeError, UnknownNameError
-from ..model.library import find_vehicle
+from ..model.shipped import find_vehicle
 from ..model.system import LinearSystem, Parameter
 from ..model.tables import table_values
 from ..model.vehicle import Vehicle, load_vehicle
@@ -129,14 +129,14 @@ class StudyNumbers:
         if isinstance(wind, ShapingFilter):
             wind = WindModel(self.vehicle.wind.mean, wind)
         warn_beyond(wind.shaping_filter, self.vehicle)
-        study = self.from_vehicle(replace(self.vehicle, wind=wind), compile=self.executable.library is not None)
+        study = self.from_vehicle(replace(self.vehicle, wind=wind), compile=self.executable.shared_library is not None)
         values = {n: p.value for n, p in self.parameters.items() if n in study.parameters}
         return study.with_parameters(values)
 
     @cached_property
     def with_means(self) -> ExecutableSystem:
         """The system with its tables of the mean response, which the noise coefficients need, filled in."""
-        if self.executable.library is None:
+        if self.executable.shared_library is None:
             return with_mean_tables(self.executable)
         return with_sweep_mean_tables(sweep_of(self.system), self.executable)
 

@@ -6,7 +6,7 @@ import shutil
 from pathlib import Path
 
 import pytest
-from ascentwind.model.library import built_in_vehicles
+from ascentwind.model.shipped import built_in_vehicles
 from ascentwind.runners import Study
 
 

@@ -160,7 +160,7 @@ def test_parameters_change_the_numbers_without_new_code():
     )
     study = Study.from_system(system)
     other = study.with_parameters({"tau": 0.5})
-    assert other.executable.library == study.executable.library
+    assert other.executable.shared_library == study.executable.shared_library
     for s, value in ((study, 2.0), (other, 0.5)):
         found = s.response_statistics([1.0], options=TIGHT).variance.values[0, 0, 0]
         assert found == pytest.approx(1 - np.exp(-2 / value), rel=1e-8)

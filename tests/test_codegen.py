@@ -53,7 +53,7 @@ def test_interpreted_splines_equal_the_lookup(as504):
 def test_jacobian_for_the_implicit_method_is_the_derivative(as504):
     """jac_adjoint and jac_mean, which CVODES uses, against differences of the linear integrands."""
     executable = as504.with_means
-    path = str(executable.library.path)
+    path = str(executable.shared_library.path)
     parameters = executable.integrator_parameters(80.0, 20.0, 10.0, 105.0)
     for name in ("adjoint", "mean"):
         f, jac = ca.external(name, path), ca.external(f"jac_{name}", path)
@@ -98,9 +98,9 @@ def test_source_holds_structure_only(as504, edit):
 
 def test_second_load_takes_the_library_from_the_cache(own_cache):
     first, second = executable_system(lag()), executable_system(lag(gain=3.0))
-    assert first.library.fresh
-    assert not second.library.fresh
-    assert first.library.path == second.library.path
+    assert first.shared_library.fresh
+    assert not second.shared_library.fresh
+    assert first.shared_library.path == second.shared_library.path
     assert stat.S_IMODE(own_cache.stat().st_mode) == 0o700
 
 
@@ -114,11 +114,11 @@ def test_regeneration_says_what_changed(own_cache, caplog):
 
 
 def test_damaged_library_is_set_aside_and_made_again(own_cache):
-    library = executable_system(lag()).library
+    library = executable_system(lag()).shared_library
     library.path.write_bytes(library.path.read_bytes()[:-100])
     with pytest.warns(CacheWarning, match="is damaged"):
         again = executable_system(lag())
-    assert again.library.fresh
+    assert again.shared_library.fresh
     assert list(own_cache.glob("*.damaged-*"))
     assert difference_from_core(again) <= 1e-12
 

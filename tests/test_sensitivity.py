@@ -327,7 +327,7 @@ def test_dimensional_analysis_of_the_networks(at_75):
 def test_compiled_collocation_is_that_by_lapack():
     """Random stable matrices, with forcing, forward and backward; and the duality of both."""
     random = np.random.default_rng(504)
-    library = node_functions(driven()).library
+    library = node_functions(driven()).shared_library
     assert library is not None
     edges = np.cumsum(np.append(0.0, random.uniform(0.01, 0.1, 20)))
     A = random.standard_normal((20, 3, 5, 5)) * (random.random((5, 5)) < 0.6) - 2 * np.eye(5)
@@ -349,7 +349,7 @@ def test_compiled_and_interpreted_agree(as504):
     random = np.random.default_rng(504)
     system, p = as504.system, as504.executable.parameters
     compiled, interpreted = node_functions(system), node_functions(system, False)
-    assert compiled.library is not None
+    assert compiled.shared_library is not None
     t, v = np.array([40.0, 75.0, 120.0]), np.array([list(as504.tables(x).values()) for x in (40.0, 75.0, 120.0)])
     a, x = random.standard_normal((2, 3, len(system.states)))
     c, m = random.standard_normal((3, len(system.outputs))), random.standard_normal(len(system.noises))

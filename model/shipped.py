@@ -1,4 +1,4 @@
-"""The vehicles that ship with the package."""
+"""The vehicles that ship with the package, by name."""
 
 from __future__ import annotations
 
