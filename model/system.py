@@ -8,14 +8,14 @@ The equations stand once, as CasADi expressions linear in x, w and u; the matric
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import casadi as ca
 import numpy as np
 
-from .errors import NonlinearSystemError, TimeRangeError, UnknownNameError
+from .errors import DirectNoiseError, NonlinearSystemError, TimeRangeError, UnknownNameError
 from .tables import TableGroup
 
 
@@ -195,6 +195,24 @@ class LinearSystem:
         if name not in self.output_names:
             raise UnknownNameError("response", name, self.output_names)
         return self.output_names.index(name)
+
+    def refuse_direct_noise(self, outputs: Iterable[str]) -> None:
+        """Raise if white noise reaches one of the outputs directly.
+
+        Raises
+        ------
+        DirectNoiseError
+            Names source, output and the way out.
+        """
+        rows, columns = self.D.sparsity().row(), self.D.sparsity().get_col()
+        for name in outputs:
+            for row, column in zip(rows, columns, strict=True):
+                if row == self.output_index(name) and not self.D[row, column].is_zero():
+                    raise DirectNoiseError(
+                        f"white noise of source '{self.noises[column].source}' reaches '{name}' directly, so that its "
+                        "variance is infinite; colour the noise (white = false with a correlation time) or leave the "
+                        "response out"
+                    )
 
     @cached_property
     def A(self) -> ca.SX:

@@ -224,7 +224,8 @@ def verify(
             start, last = study.system.start, max(end_times)
             at = [start + (last - start) * k / 60 for k in range(1, 61)]
             title = f"{study.system.name}: simulated flights and the adjoint's mean ± 3σ"
-            figure = sample_path_figure(found.statistics["ensemble"], study.response_statistics(at), title)
+            adjoint = study.response_statistics(at, engine="cvodes")
+            figure = sample_path_figure(found.statistics["ensemble"], adjoint, title)
         for path in write_figure(figure, out, "sample_paths"):
             console.print(str(path), soft_wrap=True)
     console.print(found.verdict(), style="green" if found.agree else "bold red", highlight=False)

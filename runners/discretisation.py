@@ -25,8 +25,8 @@ from ..codegen.functions import state_scales
 from ..model.errors import IntegrationError
 from .integration import Interval, intervals
 
-LARGEST_NORM = 0.5  # of an exponent whose series is summed; with TERMS terms it leaves less than 1e-14
-TERMS = 11
+LARGEST_NORM = 1.0  # of an exponent whose series is summed; with TERMS terms it leaves 1e-13
+TERMS = 15
 TOGETHER = 512  # substeps computed at once
 POINTS, WEIGHTS = np.polynomial.legendre.leggauss(3)
 
@@ -174,11 +174,11 @@ def _added_covariance(
     part = exponent / 2**doublings
     Q = np.zeros((B.shape[0], len(columns), n, n))
     for point, weight in zip(POINTS, WEIGHTS, strict=True):
-        carried = _exponential(0.5 * (1 + point) * part[:, :n, :n]) @ B
+        carried = _exponential(0.5 * (1 + point) * part[:, :n, :n], B)
         for s, of_source in enumerate(columns):
             b = carried[:, :, of_source]
             Q[:, s] += 0.5 * weight / 2**doublings * (b @ b.transpose(0, 2, 1))
-    Phi = _exponential(part)
+    Phi = _exponential(part, np.eye(n + 1))
     for _ in range(doublings):
         A = Phi[:, None, :n, :n]
         Q = Q + A @ Q @ A.swapaxes(2, 3)
@@ -186,12 +186,11 @@ def _added_covariance(
     return Phi, Q
 
 
-def _exponential(X: NDArray) -> NDArray[np.float64]:
-    """Return e^X of many small matrices by its Taylor series."""
-    unit = np.eye(X.shape[-1])
-    found = unit + X / TERMS
+def _exponential(X: NDArray, on: NDArray) -> NDArray[np.float64]:
+    """Return e^X ``on`` for many small matrices by the Taylor series."""
+    found = on + X @ on / TERMS
     for k in range(TERMS - 1, 0, -1):
-        found = unit + X @ found / k
+        found = on + X @ found / k
     return found
 
 

@@ -7,7 +7,6 @@ remains is the sampling error, which the intervals show.
 
 from __future__ import annotations
 
-import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -19,6 +18,7 @@ from scipy.stats import chi2, t
 from ..codegen.compiled import ExecutableSystem
 from ..codegen.ensemble import compiled_ensemble
 from ..model.errors import AscentwindError
+from .cores import available_cores
 from .discretisation import discretise
 from .statistics import provenance, statistics_dataset
 
@@ -213,8 +213,3 @@ def ensemble_dataset(
         dataset["sample_path"] = (("path", "t", "response"), found.paths[:, :, rows], label)
         dataset = dataset.assign_coords(t=("t", found.path_times, {"units": "s", "long_name": "flight time"}))
     return dataset
-
-
-def available_cores() -> int:
-    """Return the number of processors that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -10,18 +10,21 @@ from typing import Any
 from ..codegen.cache import describe_changes
 from ..codegen.functions import core_functions
 from ..codegen.source import c_source
+from ..codegen.sweep_source import sweep_functions, sweep_source
 from ..model.system import LinearSystem
 from .output import prepare_folder, write_whole
 from .study import Study
 
 
 def generated_files(system: LinearSystem) -> dict[str, str]:
-    """Return the texts of NAME.c and manifest.json for a system."""
-    source = c_source(system, core_functions(system))
+    """Return the texts of NAME.c (adjoint, mean, matrices), NAME_sweep.c and manifest.json for a system."""
+    sources = {
+        f"{system.name}.c": c_source(system, core_functions(system)),
+        f"{system.name}_sweep.c": sweep_source(system, sweep_functions(system)),
+    }
     manifest: dict[str, Any] = {
         "name": system.name,
-        "source": f"{system.name}.c",
-        "sha256": hashlib.sha256(source.encode()).hexdigest(),
+        "sha256": {name: hashlib.sha256(text.encode()).hexdigest() for name, text in sources.items()},
         "sizes": {
             "states": len(system.states),
             "noises": len(system.noises),
@@ -39,7 +42,7 @@ def generated_files(system: LinearSystem) -> dict[str, str]:
             g.name: {"argument": g.argument, "knots": g.knots.size, "names": list(g.names)} for g in system.tables
         },
     }
-    return {f"{system.name}.c": source, "manifest.json": json.dumps(manifest, indent=1) + "\n"}
+    return {**sources, "manifest.json": json.dumps(manifest, indent=1) + "\n"}
 
 
 def regenerate(vehicle: str | Path, folder: Path) -> dict[Path, str]:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..codegen.compiled import ExecutableSystem, executable_system
 from ..model.assemble import assemble
-from ..model.errors import DirectNoiseError, ParameterValueError, TimeRangeError, UnknownNameError
+from ..model.errors import ParameterValueError, TimeRangeError, UnknownNameError
 from ..model.library import find_vehicle
 from ..model.system import LinearSystem, Parameter
 from ..model.tables import table_values
@@ -341,12 +341,5 @@ class Study:
 
     def _responses(self, responses: Iterable[str] | None) -> list[str]:
         names = list(self.system.output_names if responses is None else dict.fromkeys(responses))
-        for name in names:
-            row = self.system.D[self.system.output_index(name), :]
-            for column, noise in enumerate(self.system.noises):
-                if row[column].nnz() and not row[column].is_zero():
-                    raise DirectNoiseError(
-                        f"white noise of source '{noise.source}' reaches '{name}' directly, so that its variance is "
-                        "infinite; colour the noise (white = false with a correlation time) or leave the response out"
-                    )
+        self.system.refuse_direct_noise(names)
         return names

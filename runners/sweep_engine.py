@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import lru_cache
@@ -14,8 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..codegen.compiled import ExecutableSystem
 from ..codegen.sweep import CompiledSweep, Segments, compiled_sweep
-from ..model.errors import DirectNoiseError, IntegrationError, TimeRangeError
+from ..model.errors import AscentwindError, IntegrationError, TimeRangeError
 from ..model.system import LinearSystem
+from .cores import available_cores
 from .integration import intervals
 from .mean_response import MeanResponse, with_mean_tables
 
@@ -104,6 +104,26 @@ class SweepResult:
         return np.einsum("ksrr->krs", self.covariance)
 
 
+class BatchError(IntegrationError):
+    """Some sets of a batch failed.
+
+    Attributes
+    ----------
+    failed : dict of int to AscentwindError
+        By number of the set.
+    completed : dict of int to SweepResult
+        The others, computed to the end.
+    """
+
+    def __init__(self, failed: dict[int, AscentwindError], completed: dict[int, SweepResult]):
+        self.failed, self.completed = failed, completed
+        first = min(failed)
+        super().__init__(
+            f"parameter set {first}: {failed[first]} ({len(failed)} of {len(failed) + len(completed)} sets failed; "
+            "'completed' of this error holds the results of the others)"
+        )
+
+
 def sweep(
     engine: CompiledSweep,
     executable: ExecutableSystem,
@@ -135,7 +155,7 @@ def sweep(
     """
     system, ends = engine.system, check_times(engine.system, times)
     SweepOptions(relative_tolerance)
-    check_direct_noise(engine, engine.system.output_names if responses is None else responses)
+    system.refuse_direct_noise(system.output_names if responses is None else responses)
     longest = LONGEST_SEGMENT if weighting_spacing is None else min(LONGEST_SEGMENT, weighting_spacing)
     # an end time at the start needs no integration, only a segment to read it in
     last = ends[-1] if ends[-1] > system.start else min(system.end, system.start + longest)
@@ -212,33 +232,29 @@ def batch(
     Raises
     ------
     IntegrationError
-        If more threads are asked for than there are cores, or a set fails; the message says which.
+        If more threads are asked for than there are cores.
+    BatchError
+        If a set fails; it holds the results of the others.
     """
     cores = available_cores()
     threads = cores if threads is None else threads
     if not 1 <= threads <= cores:
         raise IntegrationError(f"{threads} threads were asked for and there are {cores} cores; choose 1 to {cores}")
 
-    def one(number_and_set: tuple[int, NDArray[np.float64]]) -> SweepResult:
-        number, values = number_and_set
+    def one(values: NDArray[np.float64]) -> SweepResult | AscentwindError:
         try:
             member = executable.with_numbers(parameters=np.asarray(values, float))
             member = with_sweep_mean_tables(engine, member, 1e-2 * relative_tolerance)
             return sweep(engine, member, times, relative_tolerance=relative_tolerance)
-        except IntegrationError as error:
-            raise IntegrationError(f"parameter set {number}: {error}") from error
+        except AscentwindError as error:
+            return error
 
-    return _map(one, list(enumerate(parameter_sets)), threads)
-
-
-def _map(work: Callable, items: list, threads: int) -> list[SweepResult]:
     with ThreadPoolExecutor(threads) as pool:
-        return list(pool.map(work, items))
-
-
-def available_cores() -> int:
-    """Return the number of processors that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+        found = list(pool.map(one, parameter_sets))
+    completed = {k: member for k, member in enumerate(found) if isinstance(member, SweepResult)}
+    if len(completed) < len(found):
+        raise BatchError({k: e for k, e in enumerate(found) if isinstance(e, AscentwindError)}, completed)
+    return list(completed.values())
 
 
 def check_times(system: LinearSystem, times: ArrayLike) -> NDArray[np.float64]:
@@ -261,19 +277,6 @@ def check_times(system: LinearSystem, times: ArrayLike) -> NDArray[np.float64]:
     if not (np.diff(ends) > 0).all():
         raise TimeRangeError(f"end times must increase; look after {ends[np.argmin(np.diff(ends) > 0)]:g} s")
     return ends
-
-
-def check_direct_noise(engine: CompiledSweep, responses: Sequence[str]) -> None:
-    """Raise DirectNoiseError if white noise reaches one of the responses directly."""
-    system, D = engine.system, engine.system.D.sparsity()
-    for row, column in zip(D.row(), D.get_col(), strict=True):
-        if system.output_names[row] in responses:
-            noise = system.noises[column]
-            raise DirectNoiseError(
-                f"white noise of source '{noise.source}' reaches '{system.output_names[row]}' directly, so that its "
-                "variance is infinite; colour the noise (white = false with a correlation time) or leave the response "
-                "out"
-            )
 
 
 def flight_segments(system: LinearSystem, times: NDArray[np.float64], longest: float) -> Segments:

@@ -21,9 +21,10 @@ from ascentwind.model import assemble, load_vehicle
 from ascentwind.model.errors import DataError, DirectNoiseError, IntegrationError, TimeRangeError
 from ascentwind.model.system import define_system
 from ascentwind.runners.adjoint import AdjointSolver
+from ascentwind.runners.cores import available_cores
 from ascentwind.runners.integration import IntegratorOptions
 from ascentwind.runners.mean_response import with_mean_tables
-from ascentwind.runners.sweep_engine import available_cores, batch, sweep, with_sweep_mean_tables
+from ascentwind.runners.sweep_engine import BatchError, batch, sweep, with_sweep_mean_tables
 from scipy.integrate import DOP853 as SciPyDOP853
 from scipy.integrate import solve_ivp
 
@@ -280,8 +281,11 @@ def test_threads_beyond_cores(as504):
 
 def test_failing_member_of_a_batch_is_numbered():
     system = lag()
-    with pytest.raises(IntegrationError, match="parameter set 1:"):
+    with pytest.raises(BatchError, match=r"parameter set 1: .*\(1 of 2 sets failed") as caught:
         batch(compiled_sweep(system), executable_system(system), [np.array([-1.0]), np.array([40.0])], [20.0])
+    alone = sweep(compiled_sweep(system), executable_system(system).with_numbers(parameters=np.array([-1.0])), [20.0])
+    assert list(caught.value.failed) == [1]
+    np.testing.assert_allclose(caught.value.completed[0].variance, alone.variance, rtol=1e-3)
 
 
 def test_white_noise_on_a_response_is_refused():

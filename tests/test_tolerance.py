@@ -34,8 +34,9 @@ def test_errors_fall_with_the_tolerance(study):
     assert {m.engine for m in found} == set(variants())
     for label in variants():
         loose, middle, tight = (m.error for m in found if m.engine == label)
-        assert tight < 1e-6 < 0.1
-        assert tight <= 0.1 * middle <= 0.1 * loose, label
+        assert tight < 1e-7
+        # the sweep's segments of 1 s make it far better than asked for here; rounding and the reference remain
+        assert tight <= 0.1 * middle <= 0.1 * loose or loose < 1e-7, label
         assert all(m.seconds > 0 for m in found)
     figure = tolerance_figure(found, pacing(study, 10.0, windows=2), "paced")
     assert len(figure.axes[0].lines) == len(variants()) + 1
