@@ -64,7 +64,9 @@ def shipped_winds(options: FitOptions | None = None) -> dict[str, WindModel]:
     winds = {}
     for name, (period, edition) in CASES.items():
         statistics = shipped_statistics(period, edition=edition, top=TOP)
-        winds[f"{name}, fitted"] = WindModel(statistics.mean_table(), synthesise(statistics, options=options).shaping_filter)
+        winds[f"{name}, fitted"] = WindModel(
+            statistics.mean_table(), synthesise(statistics, options=options).shaping_filter
+        )
     exact = shipped_statistics(top=TOP, third_order=True)
     closed = closed_form_filter(interlevel_kernel("march", "zonal", True), exact.standard_deviation_table())
     winds["march, closed form"] = WindModel(exact.mean_table(), closed)

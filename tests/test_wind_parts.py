@@ -7,7 +7,7 @@ import pytest
 import sympy as sp
 from ascentwind.model.errors import DataError, ExtrapolationWarning, UnknownNameError
 from ascentwind.model.range_reference import shipped_statistics, shipped_two_components
-from ascentwind.model.tables import Table
+from ascentwind.model.tables import Table, table_values
 from ascentwind.model.turbulence import (
     FORMS,
     LENGTH,
@@ -17,6 +17,7 @@ from ascentwind.model.turbulence import (
     turbulence_intensity,
 )
 from ascentwind.model.two_components import plane_weights, wind_in_plane
+from ascentwind.model.wind_filter import entry_name
 from ascentwind.model.wind_filter_file import filter_text, read_filter
 from ascentwind.model.wind_statistics import WindModel
 from ascentwind.runners.altitude_grid import propagated_covariance
@@ -227,6 +228,23 @@ def test_a_flight_above_the_filter_is_told(as504, march):
     shaping_filter, _ = march
     with pytest.warns(ExtrapolationWarning, match="16000 m"):
         as504.with_wind(shaping_filter)
+
+
+def test_a_filter_is_held_where_the_mean_wind_goes_on(as504, march):
+    """The mean covers 3 m to 30 km, the filters less at both ends: their coefficients are the end values there."""
+    shaping_filter, statistics = march
+    middle = synthesise(statistics.between(2000.0, 16000.0), "constrained-response").shaping_filter
+    for f, times in ((shaping_filter, (100.0, 110.0)), (middle, (12.0, 25.0, 100.0))):
+        with pytest.warns(ExtrapolationWarning):
+            study = as504.with_wind(f)
+        for time in times:
+            altitude = study.vehicle.tables["altitude"].polynomial(time)
+            F, _, H = f.at(altitude)
+            inspected = table_values(study.executable.groups, time)
+            for label, i, j in f.entries:
+                if label in "FH":
+                    wanted = F[i, j] if label == "F" else H[j]
+                    assert inspected[entry_name(label, i, j)] == pytest.approx(wanted, rel=1e-12, abs=1e-18)
 
 
 def test_vehicle_takes_a_filter_file(vehicle_folder, march):
