@@ -71,6 +71,7 @@ def fit(
         str, typer.Option(help="state-space, constrained-response, impulse-response, ...")
     ] = "state-space",
     order: Annotated[int | None, typer.Option(help="Number of states; 3 where the method allows it.")] = None,
+    noises: Annotated[int, typer.Option(help="White noises that drive the filter; state-space only.")] = 1,
     time_limit: Annotated[float, typer.Option(help="Seconds.")] = 60.0,
     out: Annotated[Path, typer.Option(help="File for the filter.")] = Path("wind_filter.json"),
 ) -> None:
@@ -82,17 +83,22 @@ def fit(
     from .least_squares import FitOptions
     from .output import prepare_folder, write_whole
     from .synthesis import synthesise
+    from .synthesis_result import SynthesisError
 
+    if noises != 1 and method != "state-space":
+        raise SynthesisError(f"method '{method}' makes filters of one noise; take --method state-space")
+    settings = {"noises": noises} if noises != 1 else {}
     prepare_folder(out.parent)
     s = _statistics(period, component, edition, top, soundings)
     with fit_progress(console, f"{method} for {s.name}", time_limit) as progress:
-        result = synthesise(s, method, order, FitOptions(time_limit=time_limit, progress=progress))
-    command = f"ascentwind wind fit --method {method} --order {result.shaping_filter.order}" + (
+        result = synthesise(s, method, order, FitOptions(time_limit=time_limit, progress=progress), **settings)
+    made = result.shaping_filter
+    command = f"ascentwind wind fit --method {method} --order {made.order} --noises {made.noise_count}" + (
         f" --period {period} --component {component} --edition {edition} --top {top:g}"
         if soundings is None
         else f" --soundings {soundings.name} --component {component}"
     )
-    made = replace(result.shaping_filter, source=f"{result.shaping_filter.source}; written by '{command}'")
+    made = replace(made, source=f"{made.source}; written by '{command}'")
     write_whole(out, lambda p: p.write_text(filter_text(made), encoding="utf-8"))
     state = "converged" if result.converged else f"NOT converged: {result.message}"
     console.print(

@@ -26,7 +26,7 @@ from ascentwind.runners.synthesis import synthesise
 from ascentwind.runners.synthesis_linear_regression import FIRST_2, FIRST_3, SECOND_2, SECOND_3, THIRD_3
 from ascentwind.runners.two_component_fit import cross_covariance, fit_noise_correlation
 from ascentwind.runners.wind_comparison import stretched_to_error
-from ascentwind.runners.wind_verification import simulate_profiles, standard_deviation
+from ascentwind.runners.wind_verification import simulate_profiles, standard_deviation, verify
 from typer.testing import CliRunner
 
 
@@ -253,15 +253,49 @@ def test_vehicle_takes_a_filter_file(vehicle_folder, march):
     shaping_filter, _ = march
     (vehicle_folder / "filter.json").write_text(filter_text(shaping_filter))
     toml = vehicle_folder / "vehicle.toml"
-    text = toml.read_text()
+    shipped = toml.read_text()
+    text = shipped.replace('"wind_march_zonal_filter.json"', '"filter.json"')
+    assert text != shipped
+
+    def found(changed: str):
+        toml.write_text(changed)
+        return load_vehicle(vehicle_folder)
+
+    vehicle = found(text)
+    assert np.array_equal(vehicle.wind.shaping_filter.F, shaping_filter.F)
+    assert next(s for s in vehicle.sources if s.name == "wind.filter").file.name == "filter.json"
+    chosen, file = 'synthesis = "fitted"', 'filter = "filter.json"\n'
     before, _, after = text.partition("[wind.correlation]")
-    after = after[after.index("\n[") :]
-    with_filter = before.replace("[wind]\n", '[wind]\nfilter = "filter.json"\n') + after
-    toml.write_text(with_filter)
-    assert np.array_equal(load_vehicle(vehicle_folder).wind.shaping_filter.F, shaping_filter.F)
-    toml.write_text(with_filter.replace('filter = "filter.json"\n', ""))
-    with pytest.raises(DataError, match="either"):
-        load_vehicle(vehicle_folder)
+    without_kernel = before + after[after.index("\n[") :]
+    # alone each needs no choice; together they do, and a choice needs what it names
+    alone = found(without_kernel.replace(chosen, ""))
+    assert np.array_equal(alone.wind.shaping_filter.F, shaping_filter.F)
+    closed = found(text.replace(file, "").replace(chosen, ""))
+    assert closed.wind.shaping_filter.name == "two_part_kernel"
+    assert found(text.replace(chosen, 'synthesis = "closed_form"')).wind.shaping_filter.name == "two_part_kernel"
+    for changed, says in (
+        (text.replace(chosen, ""), "choose with synthesis"),
+        (text.replace(file, ""), "no filter"),
+        (without_kernel.replace(chosen, 'synthesis = "closed_form"'), "no .wind.correlation."),
+        (without_kernel.replace(chosen, "").replace(file, ""), "needs filter"),
+        (text.replace('"table"   #', '"cr103010_fit"   #'), "only the closed form"),
+    ):
+        assert changed != text
+        with pytest.raises(DataError, match=says):
+            found(changed)
+
+
+def test_shipped_filter_is_the_fit_it_says(as504):
+    """The command in the file, run again, gives its covariances; against the data by the engine, not the fit."""
+    shipped = as504.vehicle.wind.shaping_filter
+    assert "--edition 1983 --top 30000" in shipped.source
+    statistics = shipped_statistics(top=30000.0)
+    again = synthesise(statistics, noises=2)
+    check = verify(shipped, statistics)
+    assert check.covariance == pytest.approx(again.covariance, rel=1e-3, abs=1e-3)
+    assert check.rms_error < 0.25
+    assert check.share_inside == 1.0
+    assert check.largest_pole < -1e-6
 
 
 def test_poorer_filters_are_as_wrong_as_asked(march):
