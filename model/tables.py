@@ -139,13 +139,21 @@ class TableGroup:
     def from_polynomials(
         name: str, argument: str, polynomials: Sequence[tuple[str, str, PPoly]], start: float, end: float
     ) -> TableGroup:
-        """Merge (name, unit, polynomial) onto the union of the knots between ``start`` and ``end``."""
+        """Merge (name, unit, polynomial) onto the union of the knots between ``start`` and ``end``.
+
+        A polynomial that covers less than the union is held at its own first and last value.
+        """
         inner = np.concatenate([p.x for _, _, p in polynomials])
         knots = np.unique(np.concatenate([[start], inner[(inner > start) & (inner < end)], [end]]))
         keep = np.concatenate([[True], np.diff(knots) > 1e-9 * max(1.0, abs(end))])
         knots = knots[keep]
         middle = 0.5 * (knots[:-1] + knots[1:])
-        columns = [taylor_coefficients(p, knots[:-1], middle)[::-1].T for _, _, p in polynomials]
+        columns = []
+        for _, _, p in polynomials:
+            column = taylor_coefficients(p, knots[:-1], middle)[::-1].T
+            for outside, end_value in ((middle < p.x[0], p(p.x[0])), (middle > p.x[-1], p(p.x[-1]))):
+                column[outside] = [float(end_value), 0.0, 0.0, 0.0]
+            columns.append(column)
         return TableGroup(
             name,
             argument,

@@ -133,7 +133,25 @@ def _realisation(form: str) -> tuple[NDArray, NDArray, NDArray]:
     return A, B, C / float(-C @ np.linalg.solve(A, B[:, 0]))
 
 
-def add_filters(first: ShapingFilter, second: ShapingFilter, correlation: Table | None = None) -> ShapingFilter:
+def start_cross_covariance(first: ShapingFilter, second: ShapingFilter, correlation: float) -> NDArray[np.float64]:
+    """Return the covariance of the states of two filters at their start that correlates their winds there, (n, m).
+
+    C = r (P1 H1 / sigma1) (P2 H2 / sigma2)': the winds have the correlation r, and the joint covariance is positive
+    semidefinite for any |r| <= 1.
+    """
+    if not abs(correlation) <= 1:
+        raise DataError(f"a correlation of {correlation:g} of two winds at their start is not between -1 and 1")
+    parts = []
+    for f in (first, second):
+        direction = f.start_covariance @ f.H[0]
+        deviation = np.sqrt(f.H[0] @ direction)
+        parts.append(direction / deviation if deviation > 0 else np.zeros_like(direction))
+    return correlation * np.outer(*parts)
+
+
+def add_filters(
+    first: ShapingFilter, second: ShapingFilter, correlation: Table | None = None, start_correlation: float = 0.0
+) -> ShapingFilter:
     """Return the sum of two winds over the altitudes that both cover.
 
     Parameters
@@ -141,6 +159,8 @@ def add_filters(first: ShapingFilter, second: ShapingFilter, correlation: Table 
     correlation : Table, optional
         Correlation over altitude (m) of the first noise of the second filter with the first noise of the first one
         (report 3.3, figure 3-1); independent without it.
+    start_correlation : float
+        Of the two winds at the lowest altitude.
     """
     low, high = max(first.altitude[0], second.altitude[0]), min(first.altitude[-1], second.altitude[-1])
     if not high > low:
@@ -162,6 +182,9 @@ def add_filters(first: ShapingFilter, second: ShapingFilter, correlation: Table 
         G[:, first.order :, 0] = r[:, None] * own
         G[:, first.order :, first.noise_count] = np.sqrt(1 - r**2)[:, None] * own
     H = np.array([np.concatenate([a[2], b[2]]) for a, b in zip(*values, strict=True)])
+    start = np.asarray(block_diag(first.start_covariance, second.start_covariance))
+    cross = start_cross_covariance(first, second, start_correlation)
+    start[: first.order, first.order :], start[first.order :, : first.order] = cross, cross.T
     kinks = tuple(sorted({x for f in (first, second) for x in f.kinks if low < x < high}))
     return ShapingFilter(
         f"{first.name}_and_{second.name}",
@@ -169,7 +192,7 @@ def add_filters(first: ShapingFilter, second: ShapingFilter, correlation: Table 
         F,
         G,
         H,
-        np.asarray(block_diag(first.start_covariance, second.start_covariance)),
+        start,
         kinks,
         f"{first.source}; {second.source}",
     )

@@ -35,7 +35,12 @@ def plane_weights(azimuth: float, plane: str) -> tuple[float, float]:
 
 
 def wind_in_plane(
-    zonal: WindModel, meridional: WindModel, azimuth: float, plane: str = "yaw", noise_correlation: Table | None = None
+    zonal: WindModel,
+    meridional: WindModel,
+    azimuth: float,
+    plane: str = "yaw",
+    noise_correlation: Table | None = None,
+    start_correlation: float = 0.0,
 ) -> WindModel:
     """Return the wind in a plane of the launch from its two components.
 
@@ -47,10 +52,14 @@ def wind_in_plane(
     plane : {'yaw', 'pitch'}
     noise_correlation : Table, optional
         Correlation of the filters' first noises over altitude, m; independent components without it.
+    start_correlation : float
+        Of u and v at the lowest altitude.
     """
     weights = plane_weights(azimuth, plane)
     parts = [_scaled(w.shaping_filter, x) for w, x in zip((zonal, meridional), weights, strict=True)]
-    total = add_filters(parts[0], parts[1], noise_correlation)
+    # a negative weight turns the sign of a component, and of its correlation with the other
+    start = start_correlation * float(np.sign(weights[0] * weights[1]))
+    total = add_filters(parts[0], parts[1], noise_correlation, start)
     h = np.union1d(zonal.mean.argument, meridional.mean.argument)
     h = h[
         (h >= max(t.mean.argument[0] for t in (zonal, meridional)))

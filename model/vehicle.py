@@ -150,7 +150,7 @@ def load_vehicle(folder: Path) -> Vehicle:
                     f"there is no table '{table}'{suggestion(table, reader.tables)}", file=toml, column=f"noise.{name}"
                 )
     wind = _load_wind(folder, file.wind, reader)
-    timed = [s for s in reader.sources if s.name != "wind" and s.name != "control.gains"]
+    timed = [s for s in reader.sources if s.name not in ("wind", "wind.filter", "control.gains")]
     first, last = max(timed, key=lambda s: s.first), min(timed, key=lambda s: s.last)
     start = file.start_time_s
     if start < first.first:
@@ -277,9 +277,14 @@ def _load_wind(folder: Path, entry: WindEntry, reader: _Reader) -> WindModel:
     csv = reader.read("wind", entry.statistics, WIND, "altitude", "m")
     h, interpolation = csv.columns["altitude"], entry.statistics.interpolation
     mean = Table("wind.mean", "m/s", h, csv.columns["mean"], interpolation)
-    if entry.correlation is None:
-        assert entry.filter is not None  # WindEntry has one or the other
-        return WindModel(mean, read_filter(folder / entry.filter))
+    if entry.fitted:
+        assert entry.filter is not None  # checked by WindEntry
+        file = folder / entry.filter
+        shaping_filter = read_filter(file)
+        low, high = (float(x) for x in shaping_filter.altitude[[0, -1]])
+        reader.sources.append(TableSource("wind.filter", file, "computed", shaping_filter.source, low, high))
+        return WindModel(mean, shaping_filter)
+    assert entry.correlation is not None
     sigma = csv.columns["standard_deviation"]
     if entry.standard_deviation == "cr103010_fit":
         sigma = report_standard_deviation(h)

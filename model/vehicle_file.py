@@ -113,16 +113,37 @@ class CorrelationEntry(Section):
 
 
 class WindEntry(Section):
+    """``synthesis`` chooses between ``filter``, a file of 'ascentwind wind fit', and [wind.correlation]."""
+
+    synthesis: Literal["fitted", "closed_form"] | None = None
     statistics: TableEntry
     standard_deviation: Literal["table", "cr103010_fit"] = "table"
-    correlation: CorrelationEntry | None = None
     filter: str | None = None
+    correlation: CorrelationEntry | None = None
 
     @model_validator(mode="after")
     def _one_filter(self):
-        if (self.correlation is None) == (self.filter is None):
-            raise ValueError('needs either [wind.correlation] (closed form) or filter = "FILE" (ascentwind wind fit)')
+        if self.filter is None and self.correlation is None:
+            raise ValueError('needs filter = "FILE" (ascentwind wind fit) or [wind.correlation] (closed form)')
+        if self.synthesis is None and self.filter is not None and self.correlation is not None:
+            raise ValueError(
+                'has both a filter and [wind.correlation]; choose with synthesis = "fitted" or "closed_form"'
+            )
+        if self.fitted and self.filter is None:
+            raise ValueError('has synthesis = "fitted" but no filter = "FILE"; write one with \'ascentwind wind fit\'')
+        if not self.fitted and self.correlation is None:
+            raise ValueError('has synthesis = "closed_form" but no [wind.correlation]; add it or take "fitted"')
+        if self.fitted and self.standard_deviation != "table":
+            raise ValueError(
+                f'has standard_deviation = "{self.standard_deviation}", which only the closed form takes: a fitted '
+                'filter holds its own; set synthesis = "closed_form" or remove it'
+            )
         return self
+
+    @property
+    def fitted(self) -> bool:
+        """Whether the filter file is used, not the closed form."""
+        return self.synthesis == "fitted" or (self.synthesis is None and self.filter is not None)
 
 
 class OptionsEntry(Section):

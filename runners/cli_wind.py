@@ -71,24 +71,35 @@ def fit(
         str, typer.Option(help="state-space, constrained-response, impulse-response, ...")
     ] = "state-space",
     order: Annotated[int | None, typer.Option(help="Number of states; 3 where the method allows it.")] = None,
+    noises: Annotated[int, typer.Option(help="White noises that drive the filter; state-space only.")] = 1,
     time_limit: Annotated[float, typer.Option(help="Seconds.")] = 60.0,
     out: Annotated[Path, typer.Option(help="File for the filter.")] = Path("wind_filter.json"),
 ) -> None:
     """Synthesise a filter and write it; [wind] of a vehicle takes it as filter = "FILE"."""
+    from dataclasses import replace
+
     from ..model.wind_filter_file import filter_text
+    from .fit_progress import fit_progress
     from .least_squares import FitOptions
     from .output import prepare_folder, write_whole
     from .synthesis import synthesise
+    from .synthesis_result import SynthesisError
 
+    if noises != 1 and method != "state-space":
+        raise SynthesisError(f"method '{method}' makes filters of one noise; take --method state-space")
+    settings = {"noises": noises} if noises != 1 else {}
     prepare_folder(out.parent)
     s = _statistics(period, component, edition, top, soundings)
-    with console.status(f"{method} for {s.name}") as status:
-        options = FitOptions(
-            time_limit=time_limit,
-            progress=lambda n, cost: status.update(f"{method} for {s.name}: evaluation {n}, cost {cost:.4g} m⁴/s⁴"),
-        )
-        result = synthesise(s, method, order, options)
-    write_whole(out, lambda p: p.write_text(filter_text(result.shaping_filter), encoding="utf-8"))
+    with fit_progress(console, f"{method} for {s.name}", time_limit) as progress:
+        result = synthesise(s, method, order, FitOptions(time_limit=time_limit, progress=progress), **settings)
+    made = result.shaping_filter
+    command = f"ascentwind wind fit --method {method} --order {made.order} --noises {made.noise_count}" + (
+        f" --period {period} --component {component} --edition {edition} --top {top:g}"
+        if soundings is None
+        else f" --soundings {soundings.name} --component {component}"
+    )
+    made = replace(made, source=f"{made.source}; written by '{command}'")
+    write_whole(out, lambda p: p.write_text(filter_text(made), encoding="utf-8"))
     state = "converged" if result.converged else f"NOT converged: {result.message}"
     console.print(
         f"{method}, order {result.shaping_filter.order}, {state} in {result.seconds:.1f} s: "
@@ -173,18 +184,25 @@ def compare(
     response: Annotated[str, typer.Option(help="Response.")] = "bending_moment",
 ) -> None:
     """A response under different winds: months, editions, the closed form, and filters as poor as the report's."""
-    from ..model.range_reference import shipped_statistics
-    from .study import Study
-    from .wind_comparison import REPORT_ERRORS, TOP, compare_winds, shipped_winds, stretched_to_error
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-    with console.status("fitting filters"):
-        winds: dict = shipped_winds()
+    from ..model.range_reference import shipped_statistics
+    from .fit_progress import fit_progress
+    from .least_squares import FitOptions
+    from .study import Study
+    from .wind_comparison import CASES, REPORT_ERRORS, TOP, compare_winds, shipped_winds, stretched_to_error
+
+    limit = FitOptions().time_limit
+    with fit_progress(console, "fitting filters", limit * len(CASES)) as fitting:
+        winds: dict = shipped_winds(FitOptions(progress=fitting))
         march = shipped_statistics(top=TOP)
         for rms in REPORT_ERRORS:
             poorer = stretched_to_error(winds["march, fitted"].shaping_filter, march, rms)
             winds[f"march, wrong by {rms:.0f} m²/s² rms"] = poorer
-    with console.status("responses"):
-        found = compare_winds(Study.load(vehicle), winds, time, response)
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=console, transient=True) as bar:
+        task = bar.add_task("responses", total=len(winds) + 1)
+        found = compare_winds(Study.load(vehicle), winds, time, response, progress=lambda: bar.advance(task))
     table = Table(title=f"{response} at {time:g} s, wind alone")
     for column in ("wind", "mean", "σ", "variance against the first"):
         table.add_column(column, justify="left" if column == "wind" else "right")

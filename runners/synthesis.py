@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable
 
-from ..model.errors import UnknownNameError
+from ..model.errors import AscentwindWarning, UnknownNameError
 from ..model.wind_statistics import WindStatistics
 from . import (
     synthesis_constrained_response,
@@ -27,6 +27,13 @@ METHODS: dict[str, tuple[Callable[..., SynthesisResult], tuple[int, ...]]] = {
     synthesis_parameters.METHOD: (synthesis_parameters.synthesise_parameters, (2,)),
     synthesis_linear_regression.METHOD: (synthesis_linear_regression.synthesise_linear_regression, (2, 3)),
 }
+
+
+LONGEST_DECAY = 1e6  # m: a mode that lives longer than this is a constant over any flight
+
+
+class SlowFilterWarning(AscentwindWarning):
+    """A synthesised filter has a frozen pole that hardly decays or grows."""
 
 
 def synthesise(
@@ -61,6 +68,8 @@ def synthesise(
     -----
     StalledFitWarning
         The optimiser stopped early; the result is the best found and ``converged`` is False.
+    SlowFilterWarning
+        A frozen pole of the filter does not decay within ``LONGEST_DECAY``, or grows.
     """
     if method not in METHODS:
         raise UnknownNameError("synthesis method", method, METHODS)
@@ -79,6 +88,16 @@ def synthesise(
             StalledFitWarning(
                 f"{method} for {statistics.name} stopped before it converged ({result.message}); the filter is the "
                 f"best found, with {result.rms_error:.3g} m2/s2 rms"
+            ),
+            stacklevel=2,
+        )
+    if result.largest_pole > -1 / LONGEST_DECAY:
+        grows = result.largest_pole >= 0
+        warnings.warn(
+            SlowFilterWarning(
+                f"{method} for {statistics.name}: a frozen pole of the filter reaches {result.largest_pole:.2g} 1/m, "
+                + ("which grows" if grows else f"a decay over {-1e-3 / result.largest_pole:.0f} km")
+                + "; above the data such coefficients must not be held, and another order or method may do without"
             ),
             stacklevel=2,
         )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from ..model.errors import AscentwindError
 from ..model.wind_filter import ShapingFilter
 from ..model.wind_statistics import WindStatistics
 from .covariance_intervals import share_inside
+from .frozen_poles import largest_pole
 
 
 class SynthesisError(AscentwindError):
@@ -67,6 +69,11 @@ class SynthesisResult:
     def error_by_altitude(self) -> NDArray[np.float64]:
         """Root mean square error of the covariances with each altitude, m2/s2, (k,)."""
         return np.sqrt(np.mean(self.error**2, axis=1))
+
+    @cached_property
+    def largest_pole(self) -> float:
+        """Largest real part of the frozen poles between the lowest and the highest altitude, 1/m."""
+        return largest_pole(self.shaping_filter)
 
     def share_inside(self, confidence: float = 0.90) -> float:
         """Return the share of the distinct covariances inside the confidence interval of the data."""

@@ -1,10 +1,16 @@
 """Direct fit of a state-space filter whose states keep unit covariance at every altitude.
 
-With P(h) = I the covariance equation P' = F P + P F' + G G' = 0 says F = S - G G'/2, S skew: any G and S give a filter
-that is stable at every altitude (its symmetric part is -G G'/2), whose states all stay near one, and whose start
-covariance is I, so that the wind has its variance from the ground up. A rotation of the states makes the wind
-sigma(h) times the first state: the standard deviation is met exactly at every altitude, and only the correlations are
-fitted. For one noise another rotation leaves two gains and two bands of S, 2 n - 1 functions of altitude.
+With P(h) = I the covariance equation P' = F P + P F' + G G' = 0 says F = S - G G'/2, S skew. The states all stay near
+one and the start covariance is I, so that the wind has its variance from the ground up. Rotations of the states and
+noises bring the first noise to the last state alone and make S a chain of neighbours, S[i, i+1] > 0 (Schwarz's form):
+
+    F = [[0, s1, 0], [-s1, 0, s2], [0, -s2, -g^2/2]],   G = [0, 0, g]',   W = sigma(h) u(h)' z,   |u| = 1
+
+A frozen mode without decay would be orthogonal to G, so zero in the last state, and by the chain in all: every such
+filter is strictly stable at every altitude, and with one noise between samples too, where entries keep their signs.
+The standard deviation is met exactly at every altitude and only correlations are fitted: for one noise n - 1
+rotations, the gain and n - 1 components of u, 2 n - 1 functions of altitude. Further noises reach the states before
+the last with gains of their own.
 """
 
 from __future__ import annotations
@@ -38,40 +44,45 @@ SMOOTHNESS, RIDGE = 0.5, 0.1  # m2/s2 a unit of second difference and of value: 
 ENOUGH = 0.004  # rms error over mean variance; above it other starts are drawn, against local minima
 FURTHER_STARTS, SPREAD = 6, 0.5  # a start is shifted by a normal deviate, one a function, 1/km or ln
 TAYLOR = 6  # terms of the exponential over a step of the fit
-LARGEST_GAIN = 3.0  # 1/sqrt(km): keeps decay over a step of the fit near one, where the series holds
+SMALLEST, LARGEST = 0.05, 3.0  # rotations, 1/km, and gain, 1/sqrt(km): strictly stable; the series holds over a step
+START_ROTATION, START_GAIN, START_FURTHER = 0.4, 0.6, 0.2
+START_DIRECTION = (1.0, 1.0, 0.5, 0.3, 0.2)  # of H, in units of its last component
 
 
 class _Form:
-    """Positions of the unknown functions of altitude in G (n, m) and the skew matrix S (n, n)."""
+    """Positions of the unknown functions of altitude in F (n, n), G (n, m) and the direction of H (n,)."""
 
     def __init__(self, order: int, noises: int):
         self.order, self.noises = order, noises
-        if noises == 1:
-            self.gains = [(i, 0) for i in range(min(2, order))]
-            bands: tuple[int, ...] = (1, 2)
-        else:
-            self.gains = [(i, j) for j in range(noises) for i in range(j, order)]
-            bands = tuple(range(1, order))
-        self.skew = [(i, i + b) for b in bands for i in range(order - b)]
-        self.positive = [i == j or noises == 1 for i, j in self.gains]
+        self.chain = [(i, i + 1) for i in range(order - 1)]
+        self.further = [(i, j) for j in range(1, noises) for i in range(order - j)]
 
     @property
     def functions(self) -> int:
-        return len(self.gains) + len(self.skew)
+        return 2 * self.order - 1 + len(self.further)
 
     def start(self) -> NDArray[np.float64]:
-        """Return a value of each function, in 1/km: gains fall and rotations are of the order of 0.3 rad/km."""
-        gains = [np.log(0.4 / (LARGEST_GAIN - 0.4)) if p else 0.2 for p in self.positive]
-        return np.array([*gains, *(0.3 / (j - i) for i, j in self.skew)])
+        """Return a value of each function, before its bounds."""
+        bounded = [START_ROTATION / (i + 1) for i in range(self.order - 1)] + [START_GAIN]
+        share = (np.array(bounded) - SMALLEST) / (LARGEST - SMALLEST)
+        return np.array(
+            [*np.log(share / (1 - share)), *START_DIRECTION[: self.order - 1], *(0.2 for _ in self.further)]
+        )
 
     def matrices(self, values, zeros, exp):
-        """Return F and G for the values of the functions, symbolic or numeric."""
-        G, S = zeros(self.order, self.noises), zeros(self.order, self.order)
-        for f, ((i, j), positive) in enumerate(zip(self.gains, self.positive, strict=True)):
-            G[i, j] = LARGEST_GAIN / (1 + exp(-values[f])) if positive else values[f]
-        for f, (i, j) in enumerate(self.skew, start=len(self.gains)):
-            S[i, j], S[j, i] = values[f], -values[f]
-        return S - G @ G.T / 2, G
+        """Return F, G and the unit vector along H for the values of the functions, symbolic or numeric."""
+        n = self.order
+        G, S, H = zeros(n, self.noises), zeros(n, n), zeros(n, 1)
+        bounded = [SMALLEST + (LARGEST - SMALLEST) / (1 + exp(-values[f])) for f in range(n)]
+        for (i, j), rotation in zip(self.chain, bounded, strict=False):
+            S[i, j], S[j, i] = rotation, -rotation
+        G[n - 1, 0] = bounded[n - 1]
+        for f, position in enumerate(self.further, start=2 * n - 1):
+            G[position] = values[f]
+        H[n - 1, 0] = 1
+        for i in range(n - 1):
+            H[i, 0] = values[n + i]
+        return S - G @ G.T / 2, G, H / (H.T @ H) ** 0.5
 
 
 def synthesise_state_space(
@@ -126,22 +137,24 @@ def _residuals(altitude: tuple[float, ...], order: int, noises: int) -> Residual
     x = ca.SX.sym("x", knots.size * form.functions)
     table = ca.reshape(x, knots.size, form.functions)
     data, deviation, covariance = covariance_symbols(h.size)
-    first = ca.SX.zeros(order, 1)
-    first[0] = 1
-    columns, errors = first, []
     basis = natural_spline(knots, np.eye(knots.size))
+
+    def matrices(x: float):
+        return form.matrices(ca.vec(ca.DM(basis(x)).T @ table), ca.SX.zeros, ca.exp)
+
+    columns, errors = matrices(h[0])[2], []
     for i, edges in enumerate(divided(h, FIT_STEP), start=1):
         phi = ca.SX.eye(order)
         for a, b in pairwise(edges):
-            weights = ca.DM(basis(0.5 * (a + b))).T
-            F, _ = form.matrices(ca.vec(weights @ table), ca.SX.zeros, ca.exp)
+            F, _, _ = matrices(0.5 * (a + b))
             term = phi
             for q in range(1, TAYLOR + 1):
                 term = (b - a) / q * (F @ term)
                 phi += term
         columns = phi @ columns
-        errors += [columns[0, j] * deviation[i] * deviation[j] - covariance[i, j] for j in range(i)]
-        columns = ca.horzcat(columns, first)
+        H = matrices(h[i])[2]
+        errors += [ca.dot(H, columns[:, j]) * deviation[i] * deviation[j] - covariance[i, j] for j in range(i)]
+        columns = ca.horzcat(columns, H)
     smooth = ca.vec(ca.DM(second_differences(knots.size)) @ table)
     pull = x - np.repeat(form.start(), knots.size)
     return residual_functions(ca.vertcat(*errors, SMOOTHNESS * smooth, RIDGE * pull), x, data)
@@ -150,35 +163,34 @@ def _residuals(altitude: tuple[float, ...], order: int, noises: int) -> Residual
 def _own_covariance(statistics: WindStatistics, form: _Form, knots: NDArray, values: NDArray) -> NDArray[np.float64]:
     """Return sigma sigma' Phi_11, with P = I, by fine steps of the splines themselves."""
     h = statistics.altitude / 1000.0
-    first = np.eye(form.order)[:, :1]
-    correlation, columns = np.eye(h.size), first
-
     spline = natural_spline(knots, values.T)
 
-    def matrices(x: float) -> tuple[NDArray, NDArray]:
+    def matrices(x: float) -> tuple[NDArray, NDArray, NDArray]:
         return form.matrices(spline(x), lambda *s: np.zeros(s), np.exp)
+
+    correlation, columns = np.eye(h.size), matrices(h[0])[2]
 
     for i, edges in enumerate(divided(h, 0.05), start=1):
         for a, b in pairwise(edges):
-            columns = transition(matrices, a, b)[0] @ columns
-        correlation[i, :i] = correlation[:i, i] = columns[0]
-        columns = np.hstack([columns, first])
+            columns = transition(lambda x: matrices(x)[:2], a, b)[0] @ columns
+        H = matrices(h[i])[2]
+        correlation[i, :i] = correlation[:i, i] = (H.T @ columns)[0]
+        columns = np.hstack([columns, H])
     return correlation * np.outer(statistics.standard_deviation, statistics.standard_deviation)
 
 
 def _shaping_filter(statistics: WindStatistics, form: _Form, knots: NDArray, values: NDArray) -> ShapingFilter:
     altitude = dense_samples(statistics.altitude)
-    pairs = [
+    found = [
         form.matrices(v, lambda *s: np.zeros(s), np.exp) for v in natural_spline(knots, values.T)(altitude / 1000.0)
     ]
-    H = np.zeros((altitude.size, form.order))
-    H[:, 0] = statistics.standard_deviation_table().polynomial(altitude)
+    F, G, direction = (np.array(part) for part in zip(*found, strict=True))
     return ShapingFilter(
         "state_space_fit",
         altitude,
-        np.array([F for F, _ in pairs]) / 1000.0,
-        np.array([G for _, G in pairs]) / np.sqrt(1000.0),
-        H,
+        F / 1000.0,
+        G / np.sqrt(1000.0),
+        statistics.standard_deviation_table().polynomial(altitude)[:, None] * direction[:, :, 0],
         np.eye(form.order),
         source=f"direct state-space fit to {statistics.name}: {statistics.source}",
     )

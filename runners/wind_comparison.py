@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +13,7 @@ from ..model.range_reference import interlevel_kernel, shipped_statistics
 from ..model.wind_filter import ShapingFilter
 from ..model.wind_statistics import WindModel, WindStatistics, closed_form_filter
 from .altitude_grid import propagated_covariance
+from .least_squares import FitOptions
 from .study import Study
 from .synthesis import synthesise
 from .synthesis_result import SynthesisError
@@ -20,6 +21,12 @@ from .synthesis_result import SynthesisError
 TOP = 20000.0  # m, of the fitted filters of a comparison
 REPORT_ERRORS = (14.0, 14.0 * np.sqrt(2.0))  # m2/s2 rms: the report's filter, and one of twice the mean squared error
 LARGEST_STRETCH = 50.0
+CASES = {
+    "march": ("march", "1983"),
+    "february": ("february", "1983"),
+    "annual": ("annual", "1983"),
+    "march 2006": ("march", "2006"),
+}
 
 
 @dataclass(frozen=True)
@@ -32,29 +39,34 @@ class WindResponse:
 
 
 def compare_winds(
-    study: Study, winds: Mapping[str, WindModel | ShapingFilter], time: float, response: str = "bending_moment"
+    study: Study,
+    winds: Mapping[str, WindModel | ShapingFilter],
+    time: float,
+    response: str = "bending_moment",
+    progress: Callable[[], None] | None = None,
 ) -> list[WindResponse]:
-    """Return a response at an end time (s) under the study's own wind, then each of the others."""
+    """Return a response at an end time (s) under the study's own wind, then each of the others.
+
+    ``progress`` is called after each wind.
+    """
     found = []
     for name, wind in {"as in the vehicle": None, **winds}.items():
         case = study if wind is None else study.with_wind(wind)
         part = case.response_statistics([time], responses=[response]).sel(response=response, source="wind", time=time)
         found.append(WindResponse(name, float(part["mean"]), float(part["std"])))
+        if progress is not None:
+            progress()
     return found
 
 
-def shipped_winds() -> dict[str, WindModel]:
+def shipped_winds(options: FitOptions | None = None) -> dict[str, WindModel]:
     """Return the winds of the report's comparison: March, February and annual, and March of the other edition."""
-    cases = {
-        "march": ("march", "1983"),
-        "february": ("february", "1983"),
-        "annual": ("annual", "1983"),
-        "march 2006": ("march", "2006"),
-    }
     winds = {}
-    for name, (period, edition) in cases.items():
+    for name, (period, edition) in CASES.items():
         statistics = shipped_statistics(period, edition=edition, top=TOP)
-        winds[f"{name}, fitted"] = WindModel(statistics.mean_table(), synthesise(statistics).shaping_filter)
+        winds[f"{name}, fitted"] = WindModel(
+            statistics.mean_table(), synthesise(statistics, options=options).shaping_filter
+        )
     exact = shipped_statistics(top=TOP, third_order=True)
     closed = closed_form_filter(interlevel_kernel("march", "zonal", True), exact.standard_deviation_table())
     winds["march, closed form"] = WindModel(exact.mean_table(), closed)

@@ -24,6 +24,7 @@ from ..model.wind_statistics import WindStatistics
 from .adjoint import AdjointSolver
 from .altitude_grid import transition
 from .covariance_intervals import share_inside
+from .frozen_poles import largest_pole
 from .integration import IntegratorOptions
 
 SPACING = 25.0  # m, of the points at which weighting functions are multiplied
@@ -157,13 +158,6 @@ def verify(shaping_filter: ShapingFilter, statistics: WindStatistics, compile: b
         largest_pole(shaping_filter),
         float(sizes.max() / sizes.min()),
     )
-
-
-def largest_pole(shaping_filter: ShapingFilter) -> float:
-    """Return the largest real part of the frozen poles at the samples and half-way between, 1/m."""
-    h = shaping_filter.altitude
-    points = np.concatenate([h, 0.5 * (h[1:] + h[:-1])])
-    return max(float(np.linalg.eigvals(shaping_filter.at(x)[0]).real.max()) for x in points)
 
 
 def state_deviations(shaping_filter: ShapingFilter) -> NDArray[np.float64]:

@@ -24,6 +24,23 @@ def as504(cache) -> Study:
     return Study.load("as504")
 
 
+@pytest.fixture(scope="session")
+def closed_form_folder(tmp_path_factory) -> Path:
+    """A copy of AS-504 with the closed form of the wind filter in the place of the fitted one."""
+    folder = tmp_path_factory.mktemp("closed_form") / "as504"
+    shutil.copytree(built_in_vehicles()["as504"], folder)
+    toml = folder / "vehicle.toml"
+    text = toml.read_text()
+    assert 'synthesis = "fitted"' in text
+    toml.write_text(text.replace('synthesis = "fitted"', 'synthesis = "closed_form"'))
+    return folder
+
+
+@pytest.fixture(scope="session")
+def as504_closed_form(cache, closed_form_folder) -> Study:
+    return Study.load(closed_form_folder)
+
+
 @pytest.fixture
 def vehicle_folder(tmp_path) -> Path:
     """A copy of AS-504 that a test may edit."""

@@ -117,7 +117,10 @@ def test_matrices_follow_the_equations(as504):
     moment = 0.05 * slope * v["center_of_pressure"] * v["mean.angle_of_attack"] / v["moment_of_inertia"]
     assert A[rate, pressure] == pytest.approx(moment, rel=1e-12)
     # wind filter in flight time
-    assert B[column("wind_2"), 0] == pytest.approx(np.sqrt(v["altitude_rate"]) * v["wind_filter.G_2_1"], rel=1e-13)
+    assert B[column("wind_3"), 0] == pytest.approx(np.sqrt(v["altitude_rate"]) * v["wind_filter.G_3_1"], rel=1e-13)
+    assert A[column("wind_1"), column("wind_2")] == pytest.approx(
+        v["altitude_rate"] * v["wind_filter.F_1_2"], rel=1e-13
+    )
     assert not D.any()
 
 

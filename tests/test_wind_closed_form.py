@@ -26,8 +26,8 @@ SHARE = ([0, 2.3, 5.0, 11, 15, 20], [0.651, 0.327, 0.145, 0.233, 0.27, 0.35])
 
 
 @pytest.fixture(scope="module")
-def vehicle():
-    return load_vehicle(ROOT / "model" / "vehicles" / "as504")
+def vehicle(closed_form_folder):
+    return load_vehicle(closed_form_folder)
 
 
 @pytest.fixture(scope="module")

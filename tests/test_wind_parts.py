@@ -7,7 +7,7 @@ import pytest
 import sympy as sp
 from ascentwind.model.errors import DataError, ExtrapolationWarning, UnknownNameError
 from ascentwind.model.range_reference import shipped_statistics, shipped_two_components
-from ascentwind.model.tables import Table
+from ascentwind.model.tables import Table, table_values
 from ascentwind.model.turbulence import (
     FORMS,
     LENGTH,
@@ -17,6 +17,7 @@ from ascentwind.model.turbulence import (
     turbulence_intensity,
 )
 from ascentwind.model.two_components import plane_weights, wind_in_plane
+from ascentwind.model.wind_filter import entry_name
 from ascentwind.model.wind_filter_file import filter_text, read_filter
 from ascentwind.model.wind_statistics import WindModel
 from ascentwind.runners.altitude_grid import propagated_covariance
@@ -25,7 +26,7 @@ from ascentwind.runners.synthesis import synthesise
 from ascentwind.runners.synthesis_linear_regression import FIRST_2, FIRST_3, SECOND_2, SECOND_3, THIRD_3
 from ascentwind.runners.two_component_fit import cross_covariance, fit_noise_correlation
 from ascentwind.runners.wind_comparison import stretched_to_error
-from ascentwind.runners.wind_verification import simulate_profiles, standard_deviation
+from ascentwind.runners.wind_verification import simulate_profiles, standard_deviation, verify
 from typer.testing import CliRunner
 
 
@@ -99,16 +100,26 @@ def test_two_components_have_the_intralevel_correlation():
     filters = [synthesise(s).shaping_filter for s in (both.zonal, both.meridional)]
     deviations = (both.zonal.standard_deviation, both.meridional.standard_deviation)
     h = both.zonal.altitude
-    r = fit_noise_correlation(*filters, h, both.intralevel_correlation, deviations)
-    found = cross_covariance(*filters, r, h) / (deviations[0] * deviations[1])
-    # the start covariances are independent, so the surface stays at zero; 80 samples give +-.18
-    assert found[3:] == pytest.approx(both.intralevel_correlation[3:], abs=0.12)
+    r, start = fit_noise_correlation(*filters, h, both.intralevel_correlation, deviations)
+    found = cross_covariance(*filters, r, h, start) / (deviations[0] * deviations[1])
+    # at the surface exactly; above, 80 samples give +-.18
+    assert found[0] == pytest.approx(both.intralevel_correlation[0], abs=1e-12)
+    assert found == pytest.approx(both.intralevel_correlation, abs=0.03)
     # a second road: the two as one filter, simulated
-    joint = add_filters(*filters, r)
+    joint = add_filters(*filters, r, start)
     u, v = (_seen(joint, range(i, i + 3)) for i in (0, 3))
-    levels = h[[5, 12]]
+    levels = h[[0, 5, 12]]
     a, b = (simulate_profiles(f, levels, 20000, seed=7) for f in (u, v))
-    assert np.mean(a * b, axis=0) / (deviations[0] * deviations[1])[[5, 12]] == pytest.approx(found[[5, 12]], abs=0.03)
+    at = [0, 5, 12]
+    assert np.mean(a * b, axis=0) / (deviations[0] * deviations[1])[at] == pytest.approx(found[at], abs=0.03)
+    # in a plane: var(a u + b v) at the surface, with weights of either sign
+    models = [WindModel(s.mean_table(), f) for s, f in zip((both.zonal, both.meridional), filters, strict=True)]
+    for azimuth in (np.radians(72.0), np.radians(108.0)):
+        x, y = plane_weights(azimuth, "yaw")
+        total = wind_in_plane(*models, azimuth, noise_correlation=r, start_correlation=start)
+        su, sv = deviations[0][0], deviations[1][0]
+        wanted = (x * su) ** 2 + (y * sv) ** 2 + 2 * x * y * su * sv * start
+        assert standard_deviation(total.shaping_filter)[0] ** 2 == pytest.approx(wanted, rel=1e-9)
 
 
 def _seen(joint, states):
@@ -229,21 +240,72 @@ def test_a_flight_above_the_filter_is_told(as504, march):
         as504.with_wind(shaping_filter)
 
 
+def test_a_filter_is_held_where_the_mean_wind_goes_on(as504, march):
+    """The mean covers 3 m to 30 km, the filters less at both ends: their coefficients are the end values there."""
+    shaping_filter, statistics = march
+    middle = synthesise(statistics.between(2000.0, 16000.0), "constrained-response").shaping_filter
+    for f, times in ((shaping_filter, (100.0, 110.0)), (middle, (12.0, 25.0, 100.0))):
+        with pytest.warns(ExtrapolationWarning):
+            study = as504.with_wind(f)
+        for time in times:
+            altitude = study.vehicle.tables["altitude"].polynomial(time)
+            F, _, H = f.at(altitude)
+            inspected = table_values(study.executable.groups, time)
+            for label, i, j in f.entries:
+                if label in "FH":
+                    wanted = F[i, j] if label == "F" else H[j]
+                    assert inspected[entry_name(label, i, j)] == pytest.approx(wanted, rel=1e-12, abs=1e-18)
+
+
 def test_vehicle_takes_a_filter_file(vehicle_folder, march):
     from ascentwind.model.vehicle import load_vehicle
 
     shaping_filter, _ = march
     (vehicle_folder / "filter.json").write_text(filter_text(shaping_filter))
     toml = vehicle_folder / "vehicle.toml"
-    text = toml.read_text()
+    shipped = toml.read_text()
+    text = shipped.replace('"wind_march_zonal_filter.json"', '"filter.json"')
+    assert text != shipped
+
+    def found(changed: str):
+        toml.write_text(changed)
+        return load_vehicle(vehicle_folder)
+
+    vehicle = found(text)
+    assert np.array_equal(vehicle.wind.shaping_filter.F, shaping_filter.F)
+    assert next(s for s in vehicle.sources if s.name == "wind.filter").file.name == "filter.json"
+    chosen, file = 'synthesis = "fitted"', 'filter = "filter.json"\n'
     before, _, after = text.partition("[wind.correlation]")
-    after = after[after.index("\n[") :]
-    with_filter = before.replace("[wind]\n", '[wind]\nfilter = "filter.json"\n') + after
-    toml.write_text(with_filter)
-    assert np.array_equal(load_vehicle(vehicle_folder).wind.shaping_filter.F, shaping_filter.F)
-    toml.write_text(with_filter.replace('filter = "filter.json"\n', ""))
-    with pytest.raises(DataError, match="either"):
-        load_vehicle(vehicle_folder)
+    without_kernel = before + after[after.index("\n[") :]
+    # alone each needs no choice; together they do, and a choice needs what it names
+    alone = found(without_kernel.replace(chosen, ""))
+    assert np.array_equal(alone.wind.shaping_filter.F, shaping_filter.F)
+    closed = found(text.replace(file, "").replace(chosen, ""))
+    assert closed.wind.shaping_filter.name == "two_part_kernel"
+    assert found(text.replace(chosen, 'synthesis = "closed_form"')).wind.shaping_filter.name == "two_part_kernel"
+    for changed, says in (
+        (text.replace(chosen, ""), "choose with synthesis"),
+        (text.replace(file, ""), "no filter"),
+        (without_kernel.replace(chosen, 'synthesis = "closed_form"'), "no .wind.correlation."),
+        (without_kernel.replace(chosen, "").replace(file, ""), "needs filter"),
+        (text.replace('"table"   #', '"cr103010_fit"   #'), "only the closed form"),
+    ):
+        assert changed != text
+        with pytest.raises(DataError, match=says):
+            found(changed)
+
+
+def test_shipped_filter_is_the_fit_it_says(as504):
+    """The command in the file, run again, gives its covariances; against the data by the engine, not the fit."""
+    shipped = as504.vehicle.wind.shaping_filter
+    assert "--edition 1983 --top 30000" in shipped.source
+    statistics = shipped_statistics(top=30000.0)
+    again = synthesise(statistics, noises=2)
+    check = verify(shipped, statistics)
+    assert check.covariance == pytest.approx(again.covariance, rel=1e-3, abs=1e-3)
+    assert check.rms_error < 0.25
+    assert check.share_inside == 1.0
+    assert check.largest_pole < -1e-6
 
 
 def test_poorer_filters_are_as_wrong_as_asked(march):

@@ -8,8 +8,9 @@ from ascentwind.model.wind_filter import ShapingFilter
 from ascentwind.runners.wind_start import covariance_at
 
 
-def test_stationary_filter_keeps_its_covariance(as504):
+def test_stationary_filter_keeps_its_covariance(as504_closed_form):
     """The closed-form filter has diag(1, 3, 1) at every altitude; the study starts with it at 10 s (100 m)."""
+    as504 = as504_closed_form
     shaping_filter = as504.vehicle.wind.shaping_filter
     for altitude in (3.0, 100.0, 9000.0):
         np.testing.assert_allclose(covariance_at(shaping_filter, altitude), np.diag([1.0, 3.0, 1.0]), atol=1e-8)

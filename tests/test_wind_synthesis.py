@@ -11,14 +11,15 @@ from ascentwind.model.wind_filter import ShapingFilter
 from ascentwind.model.wind_statistics import WindStatistics, closed_form_filter
 from ascentwind.runners.altitude_grid import propagated_covariance, transition
 from ascentwind.runners.covariance_intervals import covariance_interval, share_inside
+from ascentwind.runners.frozen_poles import largest_pole
 from ascentwind.runners.least_squares import FitError, FitOptions, StalledFitWarning
-from ascentwind.runners.synthesis import synthesise
+from ascentwind.runners.synthesis import SlowFilterWarning, synthesise
 from ascentwind.runners.synthesis_impulse_response import average_responses
 from ascentwind.runners.synthesis_result import SynthesisError
+from ascentwind.runners.synthesis_state_space import _Form
 from ascentwind.runners.wind_verification import (
     engine_covariance,
     ensemble_share_inside,
-    largest_pole,
     simulate_profiles,
     standard_deviation,
     verify,
@@ -232,4 +233,32 @@ def test_all_months_and_components_converge_from_the_same_start():
             assert result.converged, (period, component)
             assert result.rms_error <= 1.0, (period, component)
             assert result.share_inside() == 1.0, (period, component)
-            assert largest_pole(result.shaping_filter) < 0, (period, component)
+            # strictly, on a grid finer than the samples: no mode lives longer than 1000 km
+            assert largest_pole(result.shaping_filter) < -1e-6, (period, component)
+
+
+@pytest.mark.parametrize(("order", "noises"), [(1, 1), (2, 1), (3, 1), (3, 2), (4, 1), (6, 3)])
+def test_any_coefficients_of_the_state_space_form_are_strictly_stable(order, noises):
+    form, random = _Form(order, noises), np.random.default_rng(504)
+    for _ in range(200):
+        F, G, H = form.matrices(2 * random.standard_normal(form.functions), lambda *s: np.zeros(s), np.exp)
+        assert np.linalg.eigvals(F).real.max() < 0
+        # unit covariance of the states and of the wind at every altitude
+        assert pytest.approx(-G @ G.T, abs=1e-12) == F + F.T
+        assert np.linalg.norm(H) == pytest.approx(1.0)
+
+
+def test_frozen_poles_between_the_samples():
+    """Stable at every sample, unstable in between: the finer grid sees it."""
+    h = np.arange(5) * 100.0
+    a = np.array([-1.0, -0.05, -0.05, -1.0, -1.0]) * 1e-3
+    f = ShapingFilter("f", h, a[:, None, None], np.ones((5, 1, 1)), np.ones((5, 1)), np.eye(1))
+    between = max(float(f.at(x)[0][0, 0]) for x in np.arange(0, 400.1, 0.5))
+    assert between > 0 > a.max()
+    assert largest_pole(f) == pytest.approx(between, rel=0.02)
+
+
+def test_a_growing_filter_is_told():
+    s = shipped_statistics().between(1000.0, 16000.0)
+    with pytest.warns(SlowFilterWarning, match="grows"):
+        synthesise(s, "linear-regression", 3)
