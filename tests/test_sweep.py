@@ -42,7 +42,8 @@ def as504():
 
 @pytest.fixture(scope="module")
 def cvodes(as504):
-    solver = AdjointSolver(as504[1], IntegratorOptions(relative_tolerance=1e-11))
+    # near the start CVODES' thrust variance, tiny against the wind's, is erratic: 7e-8 off at 1e-11, the sweep 1e-9
+    solver = AdjointSolver(as504[1], IntegratorOptions(relative_tolerance=1e-12))
     return [solver.run(t) for t in TEN]
 
 
