@@ -159,7 +159,7 @@ def sweep(
     longest = LONGEST_SEGMENT if weighting_spacing is None else min(LONGEST_SEGMENT, weighting_spacing)
     # an end time at the start needs no integration, only a segment to read it in
     last = ends[-1] if ends[-1] > system.start else min(system.end, system.start + longest)
-    segments = flight_segments(system, np.append(ends[:-1], last), longest)
+    segments = flight_segments(system, (*ends[:-1].tolist(), float(last)), longest)
     result = engine.run(executable, segments, relative_tolerance, transition=weighting_spacing is not None)
     at = np.where(ends > system.start, np.searchsorted(segments.end, ends), -1)
     found = result.covariance[at], result.mean[at], result.error[at]
@@ -279,8 +279,13 @@ def check_times(system: LinearSystem, times: ArrayLike) -> NDArray[np.float64]:
     return ends
 
 
-def flight_segments(system: LinearSystem, times: NDArray[np.float64], longest: float) -> Segments:
-    """Cut the flight at end times and discontinuities into segments no longer than ``longest`` seconds."""
+@lru_cache(maxsize=16)
+def flight_segments(system: LinearSystem, end_times: tuple[float, ...], longest: float) -> Segments:
+    """Cut the flight at end times and discontinuities into segments no longer than ``longest`` seconds.
+
+    Kept, because every member of a batch asks for the same.
+    """
+    times = np.array(end_times)
     ends, low, high = [], [], []
     for interval in intervals(system, system.start, float(times[-1])):
         inside = times[(times > interval.begin) & (times < interval.end)]
