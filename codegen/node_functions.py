@@ -12,7 +12,6 @@ with u the known inputs, themselves functions of parameters and table values.
 from __future__ import annotations
 
 import ctypes
-import hashlib
 import logging
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -27,6 +26,7 @@ from ..model.system import LinearSystem
 from .cache import CacheError, compiled_library, set_aside
 from .compiler import find_compiler
 from .expressions import c_function, enumerators
+from .fingerprint import fingerprint
 
 log = logging.getLogger(__name__)
 
@@ -183,16 +183,11 @@ def node_functions(system: LinearSystem, compile: bool = True) -> NodeFunctions:
     interpreted = NodeFunctions(functions, patterns, None)
     if compiler is None:
         return interpreted
-    here = Path(__file__).parent
-    digest = hashlib.sha256(repr((system.name, system.parameter_names, [g.names for g in system.tables])).encode())
-    for function in functions:
-        digest.update(function.serialize().encode())
-    for file in ("node_functions.py", "expressions.py", "templates/node_functions.c.jinja", "templates/collocation.c"):
-        digest.update((here / file).read_bytes())
+    files = ("node_functions.py", "expressions.py", "templates/node_functions.c.jinja", "templates/collocation.c")
     try:
         library = compiled_library(
             f"{system.name}-nodes",
-            digest.hexdigest(),
+            fingerprint(system, functions, files),
             lambda: nodes_source(system, functions),
             compiler,
             dict(system.structure),

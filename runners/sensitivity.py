@@ -25,7 +25,6 @@ from .table_knots import knot_sensitivities
 if TYPE_CHECKING:
     from .study import Study
 
-Quantity = Literal["std", "variance", "mean", "mean_plus_3sigma"]
 QUANTITIES: tuple[str, ...] = ("std", "variance", "mean", "mean_plus_3sigma")
 BAND = 1000.0  # m, of altitude
 WIND_MEAN = "wind.mean"
