@@ -12,7 +12,7 @@ from . import bending, rigid_body, slosh
 from .control import TransferFunction, transfer_function, transfer_function_symbols
 from .coupling import accelerations
 from .errors import DataError
-from .loads import bending_moment
+from .loads import bending_moment, typical_moment
 from .noise import NoiseProcess, noise_process
 from .symbols import ParameterSymbols, TableSymbols
 from .system import LinearSystem, Noise, Output, State
@@ -37,7 +37,6 @@ SCALES = {
     "bending_rate": 0.5,
     "slosh": 0.5,
     "slosh_rate": 1.0,
-    "bending_moment": 1e7,
     "dynamic_pressure_times_angle_of_attack": 1e3,
 }
 
@@ -158,7 +157,12 @@ def assemble(vehicle: Vehicle, wind_start_covariance: np.ndarray) -> LinearSyste
     ]
     outputs: list[tuple[Output, ca.SX]] = [
         (
-            Output(load.output, "N m", SCALES["bending_moment"], f"B.M. at station {load.station_m:g} m"),
+            Output(
+                load.output,
+                "N m",
+                typical_moment(vehicle.tables[f"loads.{load.output}.angle_of_attack"]),
+                f"B.M. at station {load.station_m:g} m",
+            ),
             bending_moment(tables, load.output, tanks, alpha, beta, solved.bending, solved.slosh),
         )
         for load in vehicle.file.loads
