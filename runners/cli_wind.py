@@ -75,7 +75,7 @@ def fit(
     time_limit: Annotated[float, typer.Option(help="Seconds.")] = 60.0,
     out: Annotated[Path, typer.Option(help="File for the filter.")] = Path("wind_filter.json"),
 ) -> None:
-    """Synthesise a filter and write it; [wind] of a vehicle takes it as filter = "FILE"."""
+    """Synthesise a filter and write it; \\[wind] of a vehicle takes it as filter = "FILE"."""
     from dataclasses import replace
 
     from ..model.wind_filter_file import filter_text
