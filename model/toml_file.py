@@ -1,0 +1,70 @@
+"""Reading a TOML file into a checked pydantic model, with errors that name the key and the nearest valid one."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Annotated, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from .errors import DataError, suggestion
+
+Positive = Annotated[float, Field(gt=0)]
+NotNegative = Annotated[float, Field(ge=0)]
+Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
+
+
+class Section(BaseModel):
+    """A table of a TOML file: unknown keys are refused."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+File = TypeVar("File", bound=Section)
+
+
+def read_toml(file: Path, model: type[File]) -> File:
+    """Read and check a TOML file.
+
+    Raises
+    ------
+    DataError
+        The file, the key in it, what is wrong and the nearest valid key.
+    """
+    try:
+        data = tomllib.loads(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise DataError(f"cannot be read ({error.strerror or error})", file=file) from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise DataError(f"is not valid TOML: {error}", file=file) from None
+    try:
+        return model.model_validate(data)
+    except ValidationError as error:
+        first = error.errors()[0]
+        location = [str(part) for part in first["loc"]]
+        if first["type"] == "extra_forbidden":
+            why = f"is not a key here{suggestion(location[-1], _keys_at(model, location[:-1]))}"
+        elif first["type"] == "missing":
+            why = "is missing; add it"
+        else:
+            why = str(first["msg"]).removeprefix("Value error, ")
+            if not isinstance(first["input"], dict | list):
+                why += f" (found {first['input']!r})"
+        raise DataError(why, file=file, column=".".join(location)) from None
+
+
+def _keys_at(model: type[BaseModel], path: list[str]) -> list[str]:
+    """Return the keys allowed at a path of the file, following nested models."""
+    for part in path:
+        if part.isdigit() or part not in model.model_fields:
+            continue
+        annotation = model.model_fields[part].annotation
+        stack = [annotation]
+        while stack:
+            candidate = stack.pop()
+            if isinstance(candidate, type) and issubclass(candidate, BaseModel):
+                model = candidate
+                break
+            stack.extend(getattr(candidate, "__args__", ()))
+    return list(model.model_fields)
