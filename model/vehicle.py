@@ -9,6 +9,7 @@ import numpy as np
 
 from .csv_table import CsvTable, read_csv_table
 from .errors import DataError, suggestion
+from .local_aerodynamics import PREFIX, local_columns, local_load_columns
 from .tables import Table
 from .vehicle_file import (
     BendingEntry,
@@ -143,6 +144,8 @@ def load_vehicle(folder: Path) -> Vehicle:
     for load in file.loads:
         columns = _load_columns(len(file.bending), tanks)
         reader.add(f"loads.{load.output}", load.table, columns, f"loads.{load.output}.")
+    if file.options.local_angle_of_attack:
+        _add_local(reader, file)
     for name, noise in file.noise.items():
         for table in noise.tables:
             if table not in reader.tables:
@@ -178,6 +181,22 @@ def load_vehicle(folder: Path) -> Vehicle:
         discontinuities=tuple(sorted(t for t in reader.discontinuities if start < t < last.last)),
         sources=tuple(reader.sources),
     )
+
+
+def _add_local(reader: _Reader, file: VehicleFile) -> None:
+    """Read the integrals that the option local_angle_of_attack needs."""
+    modes, missing = (
+        len(file.bending),
+        "is missing, but options.local_angle_of_attack needs it; 'ascentwind build-vehicle' makes it",
+    )
+    if file.tables.local_aerodynamics is None:
+        raise DataError(missing, file=reader.toml, column="tables.local_aerodynamics")
+    reader.add("local_aerodynamics", file.tables.local_aerodynamics, local_columns(modes), PREFIX)
+    for load in file.loads:
+        if load.local is None:
+            raise DataError(missing, file=reader.toml, column=f"loads.{load.output}.local")
+        name = f"{PREFIX}loads.{load.output}"
+        reader.add(name, load.local, local_load_columns(modes), f"{name}.")
 
 
 class _Reader:

@@ -68,6 +68,7 @@ class LoadEntry(Section):
     output: Name
     station_m: float
     table: TableEntry
+    local: TableEntry | None = None
 
 
 class NoiseEntry(Section):
@@ -148,6 +149,7 @@ class WindEntry(Section):
 
 class OptionsEntry(Section):
     full_coupling: bool = False
+    local_angle_of_attack: bool = False
     extra_outputs: tuple[ExtraOutput, ...] = ()
 
 
@@ -156,6 +158,7 @@ class TablesEntry(Section):
     trajectory: TableEntry
     propulsion: TableEntry
     aerodynamics: TableEntry
+    local_aerodynamics: TableEntry | None = None
 
 
 class VehicleFile(Section):
