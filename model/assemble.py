@@ -12,7 +12,7 @@ from . import bending, rigid_body, slosh
 from .control import TransferFunction, transfer_function, transfer_function_symbols
 from .coupling import accelerations
 from .errors import DataError
-from .loads import bending_moment
+from .loads import bending_moment, typical_moment
 from .local_aerodynamics import local_bending_moment, local_forces
 from .noise import NoiseProcess, noise_process
 from .symbols import ParameterSymbols, TableSymbols
@@ -38,7 +38,6 @@ SCALES = {
     "bending_rate": 0.5,
     "slosh": 0.5,
     "slosh_rate": 1.0,
-    "bending_moment": 1e7,
     "dynamic_pressure_times_angle_of_attack": 1e3,
 }
 
@@ -166,7 +165,8 @@ def assemble(vehicle: Vehicle, wind_start_covariance: np.ndarray) -> LinearSyste
         value = bending_moment(tables, load.output, tanks, alpha, beta, solved.bending, solved.slosh)
         if options.local_angle_of_attack:
             value += local_bending_moment(tables, load.output, attitude_rate, eta, eta_rate)
-        output = Output(load.output, "N m", SCALES["bending_moment"], f"B.M. at station {load.station_m:g} m")
+        scale = typical_moment(vehicle.tables[f"loads.{load.output}.angle_of_attack"])
+        output = Output(load.output, "N m", scale, f"B.M. at station {load.station_m:g} m")
         outputs.append((output, value))
     outputs.append((Output("angle_of_attack", "rad", SCALES["angle"], "alpha"), alpha))
     outputs.append((Output("engine_angle", "rad", SCALES["angle"], "beta"), beta))
