@@ -10,7 +10,7 @@ from typing import get_args
 
 import numpy as np
 
-from ..csv_table import CsvTable, read_csv_table
+from ..csv_table import CsvTable, Order, read_csv_table
 from ..errors import DataError
 from ..toml_file import read_toml
 from .construction import Construction
@@ -111,7 +111,9 @@ def _located(file: Path, column: str | None = None, row: int | None = None) -> I
         raise DataError(error.why, file=file, column=column, row=row) from None
 
 
-def _read(file: Path, argument: str, unit: str, order="increasing", text: tuple[str, ...] = _ORIGIN) -> CsvTable:
+def _read(
+    file: Path, argument: str, unit: str, order: Order = "increasing", text: tuple[str, ...] = _ORIGIN
+) -> CsvTable:
     table = read_csv_table(file, argument, unit, order=order, text=text)
     for status, line in zip(table.text["status"], table.lines, strict=True):
         if status not in get_args(Status):
