@@ -70,7 +70,27 @@ def read_csv_table(file: Path, argument: str, unit: str) -> CsvTable:
     Raises
     ------
     DataError
-        Missing file, header without units, a cell that is not a finite number, rows out of order or repeated.
+        As :func:`read_csv_columns`, and rows out of order or repeated.
+    """
+    table = read_csv_columns(file)
+    x = table.column(argument, unit)
+    steps = np.diff(x)
+    if not (steps > 0).all():
+        i = int(np.argmin(steps > 0))
+        why = "repeats the row above" if steps[i] == 0 else f"comes after {x[i]:g}"
+        raise DataError(
+            f"{x[i + 1]:g} {why}; sort the rows and keep each once", file=file, column=argument, row=table.lines[i + 1]
+        )
+    return table
+
+
+def read_csv_columns(file: Path) -> CsvTable:
+    """Read a table of numbers in any order.
+
+    Raises
+    ------
+    DataError
+        Missing file, header without units, a cell that is not a finite number.
     """
     try:
         text = file.read_text(encoding="utf-8-sig")
@@ -118,13 +138,4 @@ def read_csv_table(file: Path, argument: str, unit: str) -> CsvTable:
                     column=names[j],
                     row=line,
                 )
-    table = CsvTable(file, units, {n: data[:, j] for j, n in enumerate(names)}, tuple(line for line, _ in body))
-    x = table.column(argument, unit)
-    steps = np.diff(x)
-    if not (steps > 0).all():
-        i = int(np.argmin(steps > 0))
-        why = "repeats the row above" if steps[i] == 0 else f"comes after {x[i]:g}"
-        raise DataError(
-            f"{x[i + 1]:g} {why}; sort the rows and keep each once", file=file, column=argument, row=table.lines[i + 1]
-        )
-    return table
+    return CsvTable(file, units, {n: data[:, j] for j, n in enumerate(names)}, tuple(line for line, _ in body))

@@ -13,7 +13,7 @@ from .errors import DataError, suggestion
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
-ExtraOutput = Literal["lateral_drift", "drift_rate", "dynamic_pressure_times_angle_of_attack"]
+ExtraOutput = Literal["lateral_drift", "drift_rate", "dynamic_pressure_times_angle_of_attack", "load_components"]
 
 
 class Section(BaseModel):
@@ -65,8 +65,11 @@ class SloshEntry(Section):
 
 
 class LoadEntry(Section):
+    """A bending moment. ``forward_of_gimbal_m`` is ``station_m`` from the gimbal plane; slosh_reaction needs it."""
+
     output: Name
     station_m: float
+    forward_of_gimbal_m: float | None = None
     table: TableEntry
     local: TableEntry | None = None
 
@@ -150,6 +153,7 @@ class WindEntry(Section):
 class OptionsEntry(Section):
     full_coupling: bool = False
     local_angle_of_attack: bool = False
+    slosh_reaction: bool = False
     extra_outputs: tuple[ExtraOutput, ...] = ()
 
 
@@ -159,6 +163,7 @@ class TablesEntry(Section):
     propulsion: TableEntry
     aerodynamics: TableEntry
     local_aerodynamics: TableEntry | None = None
+    loads_along_vehicle: TableEntry | None = None
 
 
 class VehicleFile(Section):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from ascentwind.model.construction.flight import NormalForceComponent
@@ -25,7 +27,7 @@ def test_slope_and_center_of_pressure_by_quadrature():
                 total += np.interp(mach, c.mach, c.slope) * inside / area
             return total
 
-        pieces = list(zip(knots[:-1], knots[1:], strict=True))
+        pieces = list(pairwise(knots))
         force = sum(quad(local, a, b)[0] for a, b in pieces)
         moment = sum(quad(lambda s, local=local: s * local(s), a, b)[0] for a, b in pieces)
         slope, center = normal_force(construction, [mach])

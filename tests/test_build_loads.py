@@ -66,7 +66,7 @@ def particle_moments(vehicle: LoadedVehicle, force, couple, masses, rotary, side
 
 @pytest.mark.parametrize("side", [1, -1])
 def test_air_and_engine_moments_are_those_of_particles_from_either_side(vehicle, side):
-    """The aft part gives the same moment as the forward part: nothing acts on the vehicle that inertia does not meet."""
+    """The aft part gives the same moment as the forward part: inertia meets every force."""
     weights = vehicle.line.weights
     masses, rotary = vehicle.mass * weights, vehicle.rotary_inertia * weights
     zero = np.zeros_like(masses)
