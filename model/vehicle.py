@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -106,13 +108,15 @@ class Vehicle:
         return {"T1": self.file.control.T1, "T2": self.file.control.T2, "T3": self.file.control.T3}
 
 
-def load_vehicle(folder: Path) -> Vehicle:
+def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehicle:
     """Load a vehicle folder.
 
     Parameters
     ----------
     folder : Path
         Holds ``vehicle.toml`` and the CSV files it names.
+    changes : mapping, optional
+        Values to put in the place of the file's, by dotted key; see ``read_vehicle_file``.
 
     Raises
     ------
@@ -122,7 +126,7 @@ def load_vehicle(folder: Path) -> Vehicle:
     toml = folder / VEHICLE_FILE
     if not toml.is_file():
         raise DataError(f"holds no {VEHICLE_FILE}; start from 'ascentwind new-vehicle DIR --from as504'", file=folder)
-    file = read_vehicle_file(toml)
+    file = read_vehicle_file(toml, changes)
     reader = _Reader(folder, toml, file)
     for name, columns in (
         ("rigid_body", RIGID_BODY),
