@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from .csv_table import read_csv_columns
+from .csv_table import read_csv_table
 from .errors import DataError
 from .loads import REACTION_COLUMNS, load_columns
 from .local_aerodynamics import local_load_columns
@@ -76,7 +76,7 @@ def load_station_loads(vehicle: Vehicle) -> StationLoads:
             column=f"tables.{KEY}",
         )
     file: Path = vehicle.folder / entry.file
-    csv = read_csv_columns(file)
+    csv = read_csv_table(file, "time", "s", order="not decreasing")
     columns = along_columns(len(vehicle.bending), [tank.name for tank in vehicle.slosh])
     for name, unit, _ in (*ARGUMENTS, *columns):
         csv.column(name, unit)
