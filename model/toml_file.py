@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, TypeVar
+from typing import Annotated, Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -24,8 +25,16 @@ class Section(BaseModel):
 File = TypeVar("File", bound=Section)
 
 
-def read_toml(file: Path, model: type[File]) -> File:
+def read_toml(file: Path, model: type[File], changes: Mapping[str, Any] | None = None) -> File:
     """Read and check a TOML file.
+
+    Parameters
+    ----------
+    file : Path
+    model : type
+        Its pydantic model.
+    changes : mapping, optional
+        Values to put in the place of the file's, by dotted key; items of a list count from 0.
 
     Raises
     ------
@@ -38,6 +47,8 @@ def read_toml(file: Path, model: type[File]) -> File:
         raise DataError(f"cannot be read ({error.strerror or error})", file=file) from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise DataError(f"is not valid TOML: {error}", file=file) from None
+    for dotted, value in (changes or {}).items():
+        _put(data, dotted, value, file)
     try:
         return model.model_validate(data)
     except ValidationError as error:
@@ -52,6 +63,31 @@ def read_toml(file: Path, model: type[File]) -> File:
             if not isinstance(first["input"], dict | list):
                 why += f" (found {first['input']!r})"
         raise DataError(why, file=file, column=".".join(location)) from None
+
+
+def _put(data: dict[str, Any], dotted: str, value: Any, file: Path) -> None:
+    """Set a value by dotted key; sections that are missing are made, and checked with the rest."""
+    *path, last = dotted.split(".")
+    inner: Any = data
+    for part in path:
+        inner = _item(inner, part, dotted, file) if isinstance(inner, list) else inner.setdefault(part, {})
+        if not isinstance(inner, dict | list):
+            raise DataError(f"has no key '{last}': it is a value, not a section", file=file, column=dotted)
+    if isinstance(inner, list):
+        _item(inner, last, dotted, file)
+        inner[int(last)] = value
+    else:
+        inner[last] = value
+
+
+def _item(items: list[Any], index: str, dotted: str, file: Path) -> Any:
+    if not index.isdigit() or int(index) >= len(items):
+        raise DataError(
+            f"'{index}' is not an item of a list of {len(items)}; count from 0 to {len(items) - 1}",
+            file=file,
+            column=dotted,
+        )
+    return items[int(index)]
 
 
 def _keys_at(model: type[BaseModel], path: list[str]) -> list[str]:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from pydantic import Field, model_validator
 
 from .toml_file import Name, NotNegative, Positive, Section, read_toml
 
-ExtraOutput = Literal["lateral_drift", "drift_rate", "dynamic_pressure_times_angle_of_attack"]
+ExtraOutput = Literal["lateral_drift", "drift_rate", "dynamic_pressure_times_angle_of_attack", "load_components"]
 
 
 class TableEntry(Section):
@@ -57,9 +58,13 @@ class SloshEntry(Section):
 
 
 class LoadEntry(Section):
+    """A bending moment. ``forward_of_gimbal_m`` is ``station_m`` from the gimbal plane; slosh_reaction needs it."""
+
     output: Name
     station_m: float
+    forward_of_gimbal_m: float | None = None
     table: TableEntry
+    local: TableEntry | None = None
 
 
 class NoiseEntry(Section):
@@ -140,6 +145,8 @@ class WindEntry(Section):
 
 class OptionsEntry(Section):
     full_coupling: bool = False
+    local_angle_of_attack: bool = False
+    slosh_reaction: bool = False
     extra_outputs: tuple[ExtraOutput, ...] = ()
 
 
@@ -148,6 +155,8 @@ class TablesEntry(Section):
     trajectory: TableEntry
     propulsion: TableEntry
     aerodynamics: TableEntry
+    local_aerodynamics: TableEntry | None = None
+    loads_along_vehicle: TableEntry | None = None
 
 
 class VehicleFile(Section):
@@ -172,12 +181,19 @@ class VehicleFile(Section):
     options: OptionsEntry = OptionsEntry()
 
 
-def read_vehicle_file(file: Path) -> VehicleFile:
+def read_vehicle_file(file: Path, changes: Mapping[str, Any] | None = None) -> VehicleFile:
     """Read and check a vehicle's TOML file.
+
+    Parameters
+    ----------
+    file : Path
+    changes : mapping, optional
+        Values to put in the place of the file's, by dotted key: ``{"options.full_coupling": True}``. Items of a list
+        count from 0 (``bending.0.damping``).
 
     Raises
     ------
     DataError
         The file, the key in it, what is wrong and the nearest valid key.
     """
-    return read_toml(file, VehicleFile)
+    return read_toml(file, VehicleFile, changes)
