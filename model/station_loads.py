@@ -50,9 +50,7 @@ class StationLoads:
                     f"t = {time:g} s lies outside of the loads along the vehicle, {first[0]:g} to {first[-1]:g} s; "
                     "build the vehicle for it"
                 )
-        return {
-            name: np.array([table.polynomial(times) for table in tables]).T for name, tables in self.tables.items()
-        }
+        return {name: np.array([table.polynomial(times) for table in tables]).T for name, tables in self.tables.items()}
 
 
 def along_columns(modes: int, tanks: list[str]) -> tuple[tuple[str, str, str], ...]:
