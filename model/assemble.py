@@ -13,7 +13,7 @@ from .control import TransferFunction, transfer_function, transfer_function_symb
 from .coupling import accelerations
 from .errors import DataError
 from .load_components import load_components
-from .loads import bending_moment, slosh_reaction
+from .loads import bending_moment, slosh_reaction, typical_moment
 from .local_aerodynamics import local_bending_moment, local_forces
 from .noise import NoiseProcess, noise_process
 from .symbols import ParameterSymbols, TableSymbols
@@ -39,7 +39,6 @@ SCALES = {
     "bending_rate": 0.5,
     "slosh": 0.5,
     "slosh_rate": 1.0,
-    "bending_moment": 1e7,
     "dynamic_pressure_times_angle_of_attack": 1e3,
     "bending_acceleration": 3.0,
     "slosh_acceleration": 3.0,
@@ -172,7 +171,8 @@ def assemble(vehicle: Vehicle, wind_start_covariance: np.ndarray) -> LinearSyste
         if options.slosh_reaction:
             assert load.forward_of_gimbal_m is not None  # checked by load_vehicle
             value += slosh_reaction(tables, load.output, tanks, load.forward_of_gimbal_m, xi, solved.slosh)
-        output = Output(load.output, "N m", SCALES["bending_moment"], f"B.M. at station {load.station_m:g} m")
+        scale = typical_moment(vehicle.tables[f"loads.{load.output}.angle_of_attack"])
+        output = Output(load.output, "N m", scale, f"B.M. at station {load.station_m:g} m")
         outputs.append((output, value))
     outputs.append((Output("angle_of_attack", "rad", SCALES["angle"], "alpha"), alpha))
     outputs.append((Output("engine_angle", "rad", SCALES["angle"], "beta"), beta))

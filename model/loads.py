@@ -5,9 +5,23 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import casadi as ca
+import numpy as np
 
 from .slosh import attach_arms, tank_column
 from .symbols import TableSymbols
+from .tables import Table
+
+TYPICAL_ANGLE = 0.1  # rad: of the angle of attack in strong wind near the greatest dynamic pressure
+
+
+def typical_moment(angle_of_attack_coefficient: Table) -> float:
+    """Return the size of the bending moment (N m) that weighs integration errors: the largest M'_alpha times 0.1 rad.
+
+    A power of ten, since scales are written into the generated code: numbers of a table may change, and only one that
+    changes by a decade costs a compilation.
+    """
+    largest = TYPICAL_ANGLE * float(np.abs(angle_of_attack_coefficient.values).max())
+    return 10.0 ** round(np.log10(largest)) if largest > 0 else 1.0
 
 # columns of a load's table by which the rigid body answers slosh: S_1, S_2
 REACTION_COLUMNS = (("first_moment", "kg m", ""), ("second_moment", "kg m2", ""))

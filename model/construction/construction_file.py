@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 import numpy as np
 
@@ -46,6 +46,8 @@ def load_construction(folder: Path, changes: Mapping[str, Any] | None = None) ->
     ----------
     folder : Path
         Vehicle folder; docs/construction.md describes its construction.toml.
+    changes : mapping, optional
+        Values to put in the place of the file's, by dotted key; see ``read_toml``.
 
     Raises
     ------
@@ -55,7 +57,7 @@ def load_construction(folder: Path, changes: Mapping[str, Any] | None = None) ->
         An engine draws from a tank that is not there.
     """
     toml = folder / CONSTRUCTION_FILE
-    entry = read_toml(toml, ConstructionFile)
+    entry = read_toml(toml, ConstructionFile, changes)
     masses = _masses(folder / entry.masses.file, entry.aft_end_m, entry.forward_end_m)
     stiffness = _stiffness(folder / entry.stiffness.file)
     drag = _drag(folder / entry.drag.file)
@@ -94,7 +96,7 @@ def load_construction(folder: Path, changes: Mapping[str, Any] | None = None) ->
 def construction_files(folder: Path) -> tuple[Path, ...]:
     """Return construction.toml and every file that it names, in its order, each once."""
     toml = folder / CONSTRUCTION_FILE
-    entry = read_toml(toml, ConstructionFile)
+    entry = read_toml(toml, ConstructionFile, changes)
     parts = (entry.masses, entry.stiffness, entry.drag, entry.atmosphere, entry.pitch)
     names = [p.file for p in (*parts, *entry.engines, *entry.normal_force) if p is not None]
     return (toml, *(folder / name for name in dict.fromkeys(names)))

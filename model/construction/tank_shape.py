@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -118,9 +119,7 @@ class TankShape:
         """Return the integrals of A, A x and A x^2 from the bottom to levels (..., 3); x: station (m3, m4, m5)."""
         top = np.clip(np.asarray(level, dtype=float)[..., None], self.edges[:-1], self.edges[1:]) - self.edges[:-1]
         begin = self.edges[:-1]
-        powers = top[..., None] ** np.arange(1, 6) / np.arange(
-            1, 6
-        )  # integrals of y^0 .. y^4, y from the piece's begin
+        powers = top[..., None] ** np.arange(1, 6) / np.arange(1, 6)  # of y^0 .. y^4, y from the piece's begin
         of_y = [(self.coefficients * powers[..., k : k + 3]).sum(axis=-1) for k in range(3)]
         return np.stack(
             [
@@ -141,7 +140,7 @@ def _pieces(sections: Sequence[TankSection]) -> tuple[NDArray[np.float64], NDArr
     stations = np.unique([s for section in sections for s in (section.begin, section.end)])
     edges: list[float] = [float(stations[0])]
     rows: list[NDArray[np.float64]] = []
-    for a, b in zip(stations[:-1], stations[1:], strict=True):
+    for a, b in pairwise(stations):
         c = np.zeros(3)
         for section in sections:
             if section.begin < 0.5 * (a + b) < section.end:
@@ -150,7 +149,7 @@ def _pieces(sections: Sequence[TankSection]) -> tuple[NDArray[np.float64], NDArr
         roots = np.roots(np.trim_zeros(c[::-1], "f")) if scale > 0 else np.array([])
         margin = 1e-9 * (b - a)
         inner = sorted(float(r.real) for r in roots if abs(r.imag) < 1e-12 and margin < r.real < b - a - margin)
-        for y0, y1 in zip([0.0, *inner], [*inner, b - a], strict=True):
+        for y0, y1 in pairwise([0.0, *inner, b - a]):
             shifted = np.array([c[0] + y0 * (c[1] + y0 * c[2]), c[1] + 2 * y0 * c[2], c[2]])
             middle = 0.5 * (y1 - y0)
             positive = shifted[0] + middle * (shifted[1] + middle * shifted[2]) > 1e-12 * scale
