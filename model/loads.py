@@ -23,6 +23,7 @@ def typical_moment(angle_of_attack_coefficient: Table) -> float:
     largest = TYPICAL_ANGLE * float(np.abs(angle_of_attack_coefficient.values).max())
     return 10.0 ** round(np.log10(largest)) if largest > 0 else 1.0
 
+
 # columns of a load's table by which the rigid body answers slosh: S_1, S_2
 REACTION_COLUMNS = (("first_moment", "kg m", ""), ("second_moment", "kg m2", ""))
 

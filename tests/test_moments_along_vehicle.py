@@ -61,7 +61,8 @@ def folder(tmp_path_factory) -> Path:
     long = {key: np.array([part[key] for part in per_station]).T.ravel() for key in per_station[0]}
     write(made / "along.csv", long)
     write(
-        made / "local.csv", {"time [s]": time[[0, -1]]} | {f"{n} [{u}]": np.full(2, 1e-3) for n, u, _ in local_columns(modes)}
+        made / "local.csv",
+        {"time [s]": time[[0, -1]]} | {f"{n} [{u}]": np.full(2, 1e-3) for n, u, _ in local_columns(modes)},
     )
     text = (made / "vehicle.toml").read_text()
     first, last = text.index("[[loads]]"), text.index("# Relative deviations of tables")

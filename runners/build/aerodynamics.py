@@ -33,9 +33,7 @@ def normal_force(
         If a Mach number lies outside a component's table, or if the normal force vanishes.
     """
     slopes = component_slopes(construction, mach, time)
-    arms = np.array(
-        [construction.forward_of_gimbal(_centroid(component)) for component in construction.normal_force]
-    )
+    arms = np.array([construction.forward_of_gimbal(_centroid(component)) for component in construction.normal_force])
     total = slopes.sum(axis=0)
     if (total == 0).any():
         at = int(np.argmax(total == 0))
@@ -76,9 +74,7 @@ def intensity(construction: Construction, mach: ArrayLike, x: ArrayLike) -> NDAr
     return component_slopes(construction, mach).T @ np.array(shapes)
 
 
-def component_slopes(
-    construction: Construction, mach: ArrayLike, time: ArrayLike | None = None
-) -> NDArray[np.float64]:
+def component_slopes(construction: Construction, mach: ArrayLike, time: ArrayLike | None = None) -> NDArray[np.float64]:
     """Return the slope of every component at the Mach numbers, (components, n), 1/rad."""
     mach = np.atleast_1d(np.asarray(mach, float))
     if not construction.normal_force:

@@ -138,9 +138,7 @@ def _orthogonal_to_rigid_motion(
     """Return the modes without the rigid motion that the beam's own mass matrix, another quadrature, leaves in them."""
     line, x = vehicle.line, vehicle.line.points
     momentum = line.total(vehicle.mass * vehicle.displacement)
-    turning = line.total(
-        vehicle.mass * (x - center) * vehicle.displacement + vehicle.rotary_inertia * vehicle.rotation
-    )
+    turning = line.total(vehicle.mass * (x - center) * vehicle.displacement + vehicle.rotary_inertia * vehicle.rotation)
     size = np.sqrt(line.total(vehicle.mass * vehicle.displacement**2))
     left = np.maximum(np.abs(momentum) / (np.sqrt(mass) * size), np.abs(turning) / (np.sqrt(inertia) * size))
     if (left > LARGEST_IMBALANCE).any():
