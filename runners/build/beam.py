@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -146,7 +147,7 @@ def _stiffness_matrix(stiffness: Stiffness, station: NDArray[np.float64]) -> NDA
     forward node, y measured aft from there; equilibrium gives the rest.
     """
     matrix = np.zeros((2 * station.size, 2 * station.size))
-    for i, (a, b) in enumerate(zip(station[:-1], station[1:], strict=True)):
+    for i, (a, b) in enumerate(pairwise(station)):
         y0, y1, y2, shear = _flexibility(stiffness, a, b)
         relative = np.array([[-1.0, -(b - a), 1.0, 0.0], [0.0, -1.0, 0.0, 1.0]])
         element = relative.T @ np.linalg.solve([[y2 + shear, y1], [y1, y0]], relative)
@@ -162,7 +163,7 @@ def _flexibility(stiffness: Stiffness, a: float, b: float) -> tuple[float, float
     inside = stiffness.station[(stiffness.station > a) & (stiffness.station < b)]
     cuts = np.concatenate([[a], np.unique(inside), [b]])
     total = np.zeros(4)
-    for begin, end in zip(cuts[:-1], cuts[1:], strict=True):
+    for begin, end in pairwise(cuts):
         s = 0.5 * (begin + end) + 0.5 * (end - begin) * _GAUSS_POINTS
         weight = 0.5 * (end - begin) * _GAUSS_WEIGHTS
         bending, shear = stiffness_at(stiffness, s)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -34,10 +35,7 @@ def beam_edges(construction: Construction, longest: float | None = None) -> NDAr
         if aft < station < forward and min(abs(station - k) for k in knots) >= longest / 4:
             knots.append(station)
     knots.sort()
-    parts = [
-        np.linspace(a, b, math.ceil((b - a) / longest - 1e-9) + 1)[:-1]
-        for a, b in zip(knots[:-1], knots[1:], strict=True)
-    ]
+    parts = [np.linspace(a, b, math.ceil((b - a) / longest - 1e-9) + 1)[:-1] for a, b in pairwise(knots)]
     return np.concatenate([*parts, [forward]]) - construction.gimbal_station
 
 
