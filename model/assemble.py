@@ -12,7 +12,8 @@ from . import bending, rigid_body, slosh
 from .control import TransferFunction, transfer_function, transfer_function_symbols
 from .coupling import accelerations
 from .errors import DataError
-from .loads import bending_moment, typical_moment
+from .load_components import load_components
+from .loads import bending_moment, slosh_reaction, typical_moment
 from .local_aerodynamics import local_bending_moment, local_forces
 from .noise import NoiseProcess, noise_process
 from .symbols import ParameterSymbols, TableSymbols
@@ -39,6 +40,8 @@ SCALES = {
     "slosh": 0.5,
     "slosh_rate": 1.0,
     "dynamic_pressure_times_angle_of_attack": 1e3,
+    "bending_acceleration": 3.0,
+    "slosh_acceleration": 3.0,
 }
 
 
@@ -165,6 +168,9 @@ def assemble(vehicle: Vehicle, wind_start_covariance: np.ndarray) -> LinearSyste
         value = bending_moment(tables, load.output, tanks, alpha, beta, solved.bending, solved.slosh)
         if options.local_angle_of_attack:
             value += local_bending_moment(tables, load.output, attitude_rate, eta, eta_rate)
+        if options.slosh_reaction:
+            assert load.forward_of_gimbal_m is not None  # checked by load_vehicle
+            value += slosh_reaction(tables, load.output, tanks, load.forward_of_gimbal_m, xi, solved.slosh)
         scale = typical_moment(vehicle.tables[f"loads.{load.output}.angle_of_attack"])
         output = Output(load.output, "N m", scale, f"B.M. at station {load.station_m:g} m")
         outputs.append((output, value))
@@ -177,6 +183,8 @@ def assemble(vehicle: Vehicle, wind_start_covariance: np.ndarray) -> LinearSyste
             outputs.append((Output(extra, "m", SCALES["lateral_position"], "Y"), drift))
         elif extra == "drift_rate":
             outputs.append((Output(extra, "m/s", SCALES["lateral_velocity"], "Y'"), lateral_velocity))
+        elif extra == "load_components":
+            outputs += load_components(tanks, SCALES, attitude_rate, eta, eta_rate, solved.bending, xi, solved.slosh)
         else:
             q_alpha = tables["dynamic_pressure"] * alpha
             outputs.append((Output(extra, "Pa rad", SCALES[extra], "q alpha"), q_alpha))
@@ -307,6 +315,7 @@ def _structure(vehicle: Vehicle, states: Sequence[State], groups: Sequence[Table
         "extra outputs": ", ".join(vehicle.file.options.extra_outputs) or "none",
         "full coupling": str(vehicle.file.options.full_coupling).lower(),
         **({"local angle of attack": "true"} if vehicle.file.options.local_angle_of_attack else {}),
+        **({"slosh reaction": "true"} if vehicle.file.options.slosh_reaction else {}),
         "states": str(len(states)),
         "table lengths": ", ".join(f"{g.name} {len(g.names)} x {g.knots.size}" for g in groups),
     }

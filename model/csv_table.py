@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from .errors import DataError, suggestion
 
+Order = Literal["increasing", "not decreasing", "any"]
 _HEADER = re.compile(r"^\s*(?P<name>[^\[\]]+?)\s*\[(?P<unit>[^\[\]]*)\]\s*$")
 
 
@@ -64,7 +65,7 @@ def read_csv_table(
     argument: str,
     unit: str,
     *,
-    order: Literal["increasing", "not decreasing", "any"] = "increasing",
+    order: Order = "increasing",
     text: tuple[str, ...] = (),
 ) -> CsvTable:
     """Read a table and check the order of its rows.

@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 
 from .toml_file import Name, NotNegative, Positive, Section, read_toml
 
-ExtraOutput = Literal["lateral_drift", "drift_rate", "dynamic_pressure_times_angle_of_attack"]
+ExtraOutput = Literal["lateral_drift", "drift_rate", "dynamic_pressure_times_angle_of_attack", "load_components"]
 
 
 class TableEntry(Section):
@@ -58,8 +58,11 @@ class SloshEntry(Section):
 
 
 class LoadEntry(Section):
+    """A bending moment. ``forward_of_gimbal_m`` is ``station_m`` from the gimbal plane; slosh_reaction needs it."""
+
     output: Name
     station_m: float
+    forward_of_gimbal_m: float | None = None
     table: TableEntry
     local: TableEntry | None = None
 
@@ -143,6 +146,7 @@ class WindEntry(Section):
 class OptionsEntry(Section):
     full_coupling: bool = False
     local_angle_of_attack: bool = False
+    slosh_reaction: bool = False
     extra_outputs: tuple[ExtraOutput, ...] = ()
 
 
@@ -152,6 +156,7 @@ class TablesEntry(Section):
     propulsion: TableEntry
     aerodynamics: TableEntry
     local_aerodynamics: TableEntry | None = None
+    loads_along_vehicle: TableEntry | None = None
 
 
 class VehicleFile(Section):

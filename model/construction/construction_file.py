@@ -10,7 +10,7 @@ from typing import Any, get_args
 
 import numpy as np
 
-from ..csv_table import CsvTable, read_csv_table
+from ..csv_table import CsvTable, Order, read_csv_table
 from ..errors import DataError
 from ..toml_file import read_toml
 from .construction import Construction
@@ -96,7 +96,7 @@ def load_construction(folder: Path, changes: Mapping[str, Any] | None = None) ->
 def construction_files(folder: Path) -> tuple[Path, ...]:
     """Return construction.toml and every file that it names, in its order, each once."""
     toml = folder / CONSTRUCTION_FILE
-    entry = read_toml(toml, ConstructionFile, changes)
+    entry = read_toml(toml, ConstructionFile)
     parts = (entry.masses, entry.stiffness, entry.drag, entry.atmosphere, entry.pitch)
     names = [p.file for p in (*parts, *entry.engines, *entry.normal_force) if p is not None]
     return (toml, *(folder / name for name in dict.fromkeys(names)))
@@ -113,7 +113,9 @@ def _located(file: Path, column: str | None = None, row: int | None = None) -> I
         raise DataError(error.why, file=file, column=column, row=row) from None
 
 
-def _read(file: Path, argument: str, unit: str, order="increasing", text: tuple[str, ...] = _ORIGIN) -> CsvTable:
+def _read(
+    file: Path, argument: str, unit: str, order: Order = "increasing", text: tuple[str, ...] = _ORIGIN
+) -> CsvTable:
     table = read_csv_table(file, argument, unit, order=order, text=text)
     for status, line in zip(table.text["status"], table.lines, strict=True):
         if status not in get_args(Status):

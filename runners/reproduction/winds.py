@@ -60,9 +60,10 @@ def wind_figure(comparison: WindComparison, title: str) -> Figure:
     with rc_context(STYLE):
         figure = Figure(figsize=(9.0, 5.4), layout="constrained")
         axes = figure.subplots()
+        first = next(iter(comparison.statistics.values()))
+        factor, unit = display("N m", first["mean_plus_3sigma"])
         for k, (name, statistics) in enumerate(comparison.statistics.items()):
             part: xr.Dataset = statistics.sel(response=BENDING, source="wind")
-            factor, unit = display("N m")
             style = {"color": f"C{k}", "lw": 2.4 if k == 0 else 1.4}
             axes.plot(part["time"], factor * part["mean_plus_3sigma"], label=name, **style)
             axes.plot(part["time"], factor * part["mean"], ":", **style)
