@@ -51,9 +51,9 @@ def slosh_history(
         mass = density pi R^3 2 tanh(1.841 h / R) / (1.841 (1.841^2 - 1)),
         attach point 2 R / 1.841 tanh(1.841 h / (2 R)) below the surface (NASA SP-106).
 
-    'cylinder' takes the tank's largest radius and the depth that holds the liquid; 'surface_radius' the radius of the free
-    surface and the depth on the axis, the mass no more than the 0.837 of the liquid that slosh in a shallow cylinder;
-    'potential' solves for the flow in the tank's shape.
+    'cylinder' takes the tank's largest radius and the depth that holds the liquid; 'surface_radius' the radius of the
+    free surface and the depth on the axis, the mass no more than the 0.837 of the liquid that slosh in a shallow
+    cylinder; 'potential' solves for the flow in the tank's shape.
 
     Parameters
     ----------
@@ -82,8 +82,8 @@ def slosh_history(
             i = int(np.argmin(values.ravel() > 0))
             at = None if time is None else float(np.broadcast_to(np.asarray(time, dtype=float), values.shape).flat[i])
             raise DataError(
-                f"tank '{tank}' cannot slosh with {values.flat[i]:g} {what}; end the flight before, raise the residual or "
-                "set sloshes = false",
+                f"tank '{tank}' cannot slosh with {values.flat[i]:g} {what}; end the flight before, raise the residual "
+                "or set sloshes = false",
                 time=at,
             )
     density, shape = tanks[tank].density, TankShape.of(tanks[tank])
