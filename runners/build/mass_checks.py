@@ -35,8 +35,8 @@ _FLOWN = {  # table 20-10, actual: kg, m (vehicle station), kg m2
 def mass_checks(as504: Construction) -> tuple[FlightCheck, ...]:
     """Compare mass, centre of gravity and pitch inertia of AS-506, built from the shipped construction of AS-504.
 
-    The dry stages' centres of gravity, and the S-IC's inertia, are fitted to those of the same report; the sum is not. At
-    outboard cutoff gas fills the LOX tank. A fifth of the LOX below it has gone since release, about the line of the
+    The dry stages' centres of gravity, and the S-IC's inertia, are fitted to those of the same report; the sum is not.
+    At outboard cutoff gas fills the LOX tank. A fifth of the LOX below it has gone since release, about the line of the
     centre engine, so the rest stays spread as it was.
     """
     vehicle = as506(as504)

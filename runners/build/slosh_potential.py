@@ -40,13 +40,13 @@ class SloshMode:
 def first_slosh_mode(shape: TankShape, level: float) -> SloshMode:
     """Solve for the first mode with one nodal diameter.
 
-    The velocity potential f(r, z) cos(theta) makes the quotient of int |grad f|^2 over the liquid and int f^2 over the free
-    surface stationary; walls need no condition. Biquadratic elements lie on a grid between axis and wall.
+    The velocity potential f(r, z) cos(theta) makes the quotient of int |grad f|^2 over the liquid and int f^2 over the
+    free surface stationary; walls need no condition. Biquadratic elements lie on a grid between axis and wall.
 
-    With I the integral of x f over the surface, V that of x df/dz over the liquid and k the wave number, the slosh mass is
-    density k I^2 / int f^2, and the oscillator lies 2 V / (k I) below the surface: force and moment of the wall
-    pressure (by Green's formula with the harmonic functions x and x z) are those of the oscillator, its weight included.
-    For an upright cylinder both become the usual formulas.
+    With I the integral of x f over the surface, V that of x df/dz over the liquid and k the wave number, the slosh mass
+    is density k I^2 / int f^2, and the oscillator lies 2 V / (k I) below the surface: force and moment of the wall
+    pressure (by Green's formula with the harmonic functions x and x z) are those of the oscillator, its weight
+    included. For an upright cylinder both become the usual formulas.
 
     Parameters
     ----------
@@ -58,13 +58,14 @@ def first_slosh_mode(shape: TankShape, level: float) -> SloshMode:
     r, z, dofs = _grid(shape, level)
     stiffness, axial = _integrals(r, z, dofs)
     surface_mass, surface_moment, surface = _surface(r, dofs)
-    inner = np.setdiff1d(np.arange(stiffness.shape[0]), surface)
+    size = int(dofs.max()) + 1
+    inner = np.setdiff1d(np.arange(size), surface)
     condensed = stiffness[np.ix_(surface, surface)].toarray()
     lift = splu(stiffness[np.ix_(inner, inner)]).solve(stiffness[np.ix_(inner, surface)].toarray())
     condensed -= stiffness[np.ix_(surface, inner)] @ lift
     values, vectors = eigh(0.5 * (condensed + condensed.T), surface_mass, subset_by_index=(0, 0))
     wave_number, mode = float(values[0]), vectors[:, 0]
-    field = np.empty(stiffness.shape[0])
+    field = np.empty(size)
     field[surface], field[inner] = mode, -lift @ mode
     moment = float(surface_moment @ mode)  # the mode has unit int f^2 r dr; int cos^2 = pi cancels once
     return SloshMode(wave_number, math.pi * wave_number * moment**2, 2 * float(axial @ field) / (wave_number * moment))
@@ -119,7 +120,7 @@ def _integrals(
     i, j = np.broadcast_to(ed[:, :, None], matrix.shape), np.broadcast_to(ed[:, None, :], matrix.shape)
     kept = (i >= 0) & (j >= 0)
     assembled = csc_matrix((matrix[kept], (i[kept], j[kept])), shape=(size, size))
-    axial = np.bincount(ed[ed >= 0], weights=vector[ed >= 0], minlength=size)
+    axial = np.bincount(ed[ed >= 0], weights=vector[ed >= 0], minlength=size).astype(float)
     return assembled, axial
 
 
