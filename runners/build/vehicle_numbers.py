@@ -91,7 +91,9 @@ def compute_vehicle(
     slope, center = aerodynamics.normal_force(construction, flight.mach, flight.time)
     done(STEPS[2])
     slosh = {
-        tank.name: slosh_history(construction, tank.name, flight.liquid[tank.name], flight.axial_acceleration)
+        tank.name: slosh_history(
+            construction, tank.name, flight.liquid[tank.name], flight.axial_acceleration, flight.time
+        )
         for tank in construction.tanks
         if tank.sloshes
     }
