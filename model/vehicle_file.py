@@ -1,23 +1,18 @@
-"""What a vehicle's TOML file may hold (pydantic), and errors that name the key and the nearest valid one."""
+"""What a vehicle's TOML file may hold (pydantic)."""
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
-from .errors import DataError, suggestion
+from .toml_file import Section, read_toml
 
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
 ExtraOutput = Literal["lateral_drift", "drift_rate", "dynamic_pressure_times_angle_of_attack"]
-
-
-class Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 class TableEntry(Section):
@@ -188,41 +183,4 @@ def read_vehicle_file(file: Path) -> VehicleFile:
     DataError
         The file, the key in it, what is wrong and the nearest valid key.
     """
-    try:
-        data = tomllib.loads(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise DataError(f"cannot be read ({error.strerror or error})", file=file) from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise DataError(f"is not valid TOML: {error}", file=file) from None
-    try:
-        return VehicleFile.model_validate(data)
-    except ValidationError as error:
-        first = error.errors()[0]
-        location = [str(part) for part in first["loc"]]
-        key = ".".join(location)
-        if first["type"] == "extra_forbidden":
-            section = _section(VehicleFile, location[:-1])
-            why = f"is not a key here{suggestion(location[-1], section)}"
-        elif first["type"] == "missing":
-            why = "is missing; add it"
-        else:
-            why = str(first["msg"]).removeprefix("Value error, ")
-            if not isinstance(first["input"], dict | list):
-                why += f" (found {first['input']!r})"
-        raise DataError(why, file=file, column=key) from None
-
-
-def _section(model: type[BaseModel], path: list[str]) -> list[str]:
-    """Return the keys allowed at a path of the file, following nested models."""
-    for part in path:
-        if part.isdigit() or part not in model.model_fields:
-            continue
-        annotation = model.model_fields[part].annotation
-        stack = [annotation]
-        while stack:
-            candidate = stack.pop()
-            if isinstance(candidate, type) and issubclass(candidate, BaseModel):
-                model = candidate
-                break
-            stack.extend(getattr(candidate, "__args__", ()))
-    return list(model.model_fields)
+    return read_toml(file, VehicleFile)

@@ -1,0 +1,76 @@
+"""TOML files against their pydantic model, with errors that name the file, the key and the nearest valid one."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from .errors import DataError, suggestion
+
+Model = TypeVar("Model", bound=BaseModel)
+
+
+class Section(BaseModel):
+    """A table of a TOML file: keys that it does not name are refused."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+def read_toml(file: Path, model: type[Model]) -> Model:
+    """Read and check a TOML file.
+
+    Raises
+    ------
+    DataError
+        The file, the key in it, what is wrong and the nearest valid key.
+    """
+    try:
+        data = tomllib.loads(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise DataError(f"cannot be read ({error.strerror or error})", file=file) from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise DataError(f"is not valid TOML: {error}", file=file) from None
+    return validated(data, model, file)
+
+
+def validated(data: Mapping[str, Any], model: type[Model], file: Path | None = None) -> Model:
+    """Check the contents of a TOML file.
+
+    Raises
+    ------
+    DataError
+    """
+    try:
+        return model.model_validate(data)
+    except ValidationError as error:
+        first = error.errors()[0]
+        location = [str(part) for part in first["loc"]]
+        if first["type"] == "extra_forbidden":
+            why = f"is not a key here{suggestion(location[-1], _keys(model, location[:-1]))}"
+        elif first["type"] == "missing":
+            why = "is missing; add it"
+        else:
+            why = str(first["msg"]).removeprefix("Value error, ")
+            if not isinstance(first["input"], dict | list):
+                why += f" (found {first['input']!r})"
+        raise DataError(why, file=file, column=".".join(location) or None) from None
+
+
+def _keys(model: type[BaseModel], path: list[str]) -> list[str]:
+    """Return the keys allowed at a path of the file, following nested models."""
+    for part in path:
+        if part.isdigit() or part not in model.model_fields:
+            continue
+        annotation = model.model_fields[part].annotation
+        stack = [annotation]
+        while stack:
+            candidate = stack.pop()
+            if isinstance(candidate, type) and issubclass(candidate, BaseModel):
+                model = candidate
+                break
+            stack.extend(getattr(candidate, "__args__", ()))
+    return list(model.model_fields)
