@@ -13,6 +13,7 @@ from .control import TransferFunction, transfer_function, transfer_function_symb
 from .coupling import accelerations
 from .errors import DataError
 from .loads import bending_moment
+from .local_aerodynamics import local_bending_moment, local_forces
 from .noise import NoiseProcess, noise_process
 from .symbols import ParameterSymbols, TableSymbols
 from .system import LinearSystem, Noise, Output, State
@@ -130,6 +131,11 @@ def assemble(vehicle: Vehicle, wind_start_covariance: np.ndarray) -> LinearSyste
     slosh_mass = slosh.tank_column(tables, tanks, "mass")
     if options.full_coupling:
         moment += tables["axial_acceleration"] * ca.sum1(slosh_mass * xi)
+    force = rigid_body.lateral_force(tables, area, alpha, beta, attitude)
+    modal_force = bending.generalized_force(tables, area, bending_damping, eta, eta_rate, alpha, beta)
+    if options.local_angle_of_attack:
+        local = local_forces(tables, area, attitude_rate, eta, eta_rate)
+        force, moment, modal_force = force + local.force, moment + local.moment, modal_force + local.modal
     solved = accelerations(
         mass=tables["mass"],
         inertia=tables["moment_of_inertia"],
@@ -137,10 +143,9 @@ def assemble(vehicle: Vehicle, wind_start_covariance: np.ndarray) -> LinearSyste
         slosh_mass=slosh_mass,
         arms=slosh.attach_arms(tables, tanks),
         displacements=bending.displacements(tables, modes, tanks),
-        force=rigid_body.lateral_force(tables, area, alpha, beta, attitude),
+        force=force,
         moment=moment,
-        modal_force=bending.generalized_force(tables, area, bending_damping, eta, eta_rate, alpha, beta)
-        + slosh.slosh_stiffness_force(tables, tanks, slopes, xi),
+        modal_force=modal_force + slosh.slosh_stiffness_force(tables, tanks, slopes, xi),
         slosh_forcing=slosh.slosh_forcing(tables, tanks, slosh_damping, xi, xi_rate, attitude, eta, slopes),
         full=options.full_coupling,
     )
@@ -156,13 +161,13 @@ def assemble(vehicle: Vehicle, wind_start_covariance: np.ndarray) -> LinearSyste
         (wind.states, wind.derivative, _numbered("wind", wind.states.numel(), "1", 1.0)),
         *((p.state, p.derivative, [State(f"deviation_{n}")] * p.state.numel()) for n, p in noises.items()),
     ]
-    outputs: list[tuple[Output, ca.SX]] = [
-        (
-            Output(load.output, "N m", SCALES["bending_moment"], f"B.M. at station {load.station_m:g} m"),
-            bending_moment(tables, load.output, tanks, alpha, beta, solved.bending, solved.slosh),
-        )
-        for load in vehicle.file.loads
-    ]
+    outputs: list[tuple[Output, ca.SX]] = []
+    for load in vehicle.file.loads:
+        value = bending_moment(tables, load.output, tanks, alpha, beta, solved.bending, solved.slosh)
+        if options.local_angle_of_attack:
+            value += local_bending_moment(tables, load.output, attitude_rate, eta, eta_rate)
+        output = Output(load.output, "N m", SCALES["bending_moment"], f"B.M. at station {load.station_m:g} m")
+        outputs.append((output, value))
     outputs.append((Output("angle_of_attack", "rad", SCALES["angle"], "alpha"), alpha))
     outputs.append((Output("engine_angle", "rad", SCALES["angle"], "beta"), beta))
     for extra in dict.fromkeys(options.extra_outputs):
@@ -301,6 +306,7 @@ def _structure(vehicle: Vehicle, states: Sequence[State], groups: Sequence[Table
         "loads": ", ".join(load.output for load in vehicle.file.loads),
         "extra outputs": ", ".join(vehicle.file.options.extra_outputs) or "none",
         "full coupling": str(vehicle.file.options.full_coupling).lower(),
+        **({"local angle of attack": "true"} if vehicle.file.options.local_angle_of_attack else {}),
         "states": str(len(states)),
         "table lengths": ", ".join(f"{g.name} {len(g.names)} x {g.knots.size}" for g in groups),
     }

@@ -20,8 +20,16 @@ class Section(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-def read_toml(file: Path, model: type[Model]) -> Model:
+def read_toml(file: Path, model: type[Model], changes: Mapping[str, Any] | None = None) -> Model:
     """Read and check a TOML file.
+
+    Parameters
+    ----------
+    file : Path
+    model : subclass of BaseModel
+    changes : mapping, optional
+        Values to put in the place of the file's, by dotted key: ``{"options.full_coupling": True}``. Items of a list
+        count from 0 (``bending.0.damping``).
 
     Raises
     ------
@@ -34,6 +42,8 @@ def read_toml(file: Path, model: type[Model]) -> Model:
         raise DataError(f"cannot be read ({error.strerror or error})", file=file) from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise DataError(f"is not valid TOML: {error}", file=file) from None
+    for dotted, value in (changes or {}).items():
+        _put(data, dotted, value, file)
     return validated(data, model, file)
 
 
@@ -58,6 +68,31 @@ def validated(data: Mapping[str, Any], model: type[Model], file: Path | None = N
             if not isinstance(first["input"], dict | list):
                 why += f" (found {first['input']!r})"
         raise DataError(why, file=file, column=".".join(location) or None) from None
+
+
+def _put(data: dict[str, Any], dotted: str, value: Any, file: Path) -> None:
+    """Set a value by dotted key; sections that are missing are made, and checked with the rest."""
+    *path, last = dotted.split(".")
+    inner: Any = data
+    for part in path:
+        inner = _item(inner, part, dotted, file) if isinstance(inner, list) else inner.setdefault(part, {})
+        if not isinstance(inner, dict | list):
+            raise DataError(f"has no key '{last}': it is a value, not a section", file=file, column=dotted)
+    if isinstance(inner, list):
+        _item(inner, last, dotted, file)
+        inner[int(last)] = value
+    else:
+        inner[last] = value
+
+
+def _item(items: list[Any], index: str, dotted: str, file: Path) -> Any:
+    if not index.isdigit() or int(index) >= len(items):
+        raise DataError(
+            f"'{index}' is not an item of a list of {len(items)}; count from 0 to {len(items) - 1}",
+            file=file,
+            column=dotted,
+        )
+    return items[int(index)]
 
 
 def _keys(model: type[BaseModel], path: list[str]) -> list[str]:

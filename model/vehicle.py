@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from .csv_table import CsvTable, read_csv_table
 from .errors import DataError, suggestion
+from .local_aerodynamics import PREFIX, local_columns, local_load_columns
 from .tables import Table
 from .vehicle_file import (
     BendingEntry,
@@ -104,13 +107,15 @@ class Vehicle:
         return {"T1": self.file.control.T1, "T2": self.file.control.T2, "T3": self.file.control.T3}
 
 
-def load_vehicle(folder: Path) -> Vehicle:
+def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehicle:
     """Load a vehicle folder.
 
     Parameters
     ----------
     folder : Path
         Holds ``vehicle.toml`` and the CSV files it names.
+    changes : mapping, optional
+        Values to put in the place of the file's, by dotted key; see ``read_vehicle_file``.
 
     Raises
     ------
@@ -120,7 +125,7 @@ def load_vehicle(folder: Path) -> Vehicle:
     toml = folder / VEHICLE_FILE
     if not toml.is_file():
         raise DataError(f"holds no {VEHICLE_FILE}; start from 'ascentwind new-vehicle DIR --from as504'", file=folder)
-    file = read_vehicle_file(toml)
+    file = read_vehicle_file(toml, changes)
     reader = _Reader(folder, toml, file)
     for name, columns in (
         ("rigid_body", RIGID_BODY),
@@ -143,6 +148,8 @@ def load_vehicle(folder: Path) -> Vehicle:
     for load in file.loads:
         columns = _load_columns(len(file.bending), tanks)
         reader.add(f"loads.{load.output}", load.table, columns, f"loads.{load.output}.")
+    if file.options.local_angle_of_attack:
+        _add_local(reader, file)
     for name, noise in file.noise.items():
         for table in noise.tables:
             if table not in reader.tables:
@@ -178,6 +185,22 @@ def load_vehicle(folder: Path) -> Vehicle:
         discontinuities=tuple(sorted(t for t in reader.discontinuities if start < t < last.last)),
         sources=tuple(reader.sources),
     )
+
+
+def _add_local(reader: _Reader, file: VehicleFile) -> None:
+    """Read the integrals that the option local_angle_of_attack needs."""
+    modes, missing = (
+        len(file.bending),
+        "is missing, but options.local_angle_of_attack needs it; 'ascentwind build-vehicle' makes it",
+    )
+    if file.tables.local_aerodynamics is None:
+        raise DataError(missing, file=reader.toml, column="tables.local_aerodynamics")
+    reader.add("local_aerodynamics", file.tables.local_aerodynamics, local_columns(modes), PREFIX)
+    for load in file.loads:
+        if load.local is None:
+            raise DataError(missing, file=reader.toml, column=f"loads.{load.output}.local")
+        name = f"{PREFIX}loads.{load.output}"
+        reader.add(name, load.local, local_load_columns(modes), f"{name}.")
 
 
 class _Reader:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
@@ -63,6 +64,7 @@ class LoadEntry(Section):
     output: Name
     station_m: float
     table: TableEntry
+    local: TableEntry | None = None
 
 
 class NoiseEntry(Section):
@@ -143,6 +145,7 @@ class WindEntry(Section):
 
 class OptionsEntry(Section):
     full_coupling: bool = False
+    local_angle_of_attack: bool = False
     extra_outputs: tuple[ExtraOutput, ...] = ()
 
 
@@ -151,6 +154,7 @@ class TablesEntry(Section):
     trajectory: TableEntry
     propulsion: TableEntry
     aerodynamics: TableEntry
+    local_aerodynamics: TableEntry | None = None
 
 
 class VehicleFile(Section):
@@ -175,12 +179,19 @@ class VehicleFile(Section):
     options: OptionsEntry = OptionsEntry()
 
 
-def read_vehicle_file(file: Path) -> VehicleFile:
+def read_vehicle_file(file: Path, changes: Mapping[str, Any] | None = None) -> VehicleFile:
     """Read and check a vehicle's TOML file.
+
+    Parameters
+    ----------
+    file : Path
+    changes : mapping, optional
+        Values to put in the place of the file's, by dotted key: ``{"options.full_coupling": True}``. Items of a list
+        count from 0 (``bending.0.damping``).
 
     Raises
     ------
     DataError
         The file, the key in it, what is wrong and the nearest valid key.
     """
-    return read_toml(file, VehicleFile)
+    return read_toml(file, VehicleFile, changes)

@@ -15,7 +15,7 @@ from rich.table import Table
 from ..model.errors import AscentwindError, AscentwindWarning
 from .cli_checks import sensitivity, tolerance, verify
 from .cli_wind import app as wind_app
-from .terminal import VehicleArgument, console, errors, progress_bar
+from .terminal import VehicleArgument, console, errors, parse_changes, progress_bar
 
 app = typer.Typer(
     add_completion=False,
@@ -38,6 +38,10 @@ def run(
     ] = None,
     method: Annotated[str | None, typer.Option(help="CVODES formulas, adams or bdf; chooses cvodes.")] = None,
     tolerance: Annotated[float | None, typer.Option(help="Relative tolerance of the integration.")] = None,
+    changes: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="KEY=VALUE in the place of vehicle.toml's, e.g. options.full_coupling=true."),
+    ] = None,
 ) -> None:
     """Mean, variance and mean + 3 sigma of all responses over flight time: tables and figures."""
     from .engines import engine_options
@@ -50,7 +54,7 @@ def run(
     prepare_folder(folder)
     engine, options = engine_options(engine, method=method, relative_tolerance=tolerance)
     with console.status("loading and preparing code"):
-        study = Study.load(vehicle)
+        study = Study.load(vehicle, changes=parse_changes(changes or []))
     assert study.vehicle is not None
     end_times = parse_times(times or study.vehicle.file.default_times)
     families = [t for t in study.vehicle.file.weighting_times_s if study.system.start < t <= study.system.end]

@@ -7,7 +7,7 @@ import logging
 import pickle
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable
 from typing import Any
 
 import casadi as ca
@@ -37,7 +37,7 @@ class SchedulerError(AscentwindError):
 
 def compute_on_cluster(
     address: str, study: Study, task: Task, missing: Iterable[Chunk], compute: Compute = compute_chunk
-) -> Iterator[tuple[Chunk, ChunkResult]]:
+) -> Generator[tuple[Chunk, ChunkResult], None, None]:
     """Yield chunks as they are done, in any order.
 
     A chunk whose worker dies is tried again, member by member, so that one that kills its worker is found; its
@@ -117,7 +117,7 @@ class _Dispatch:
         self.lost: dict[str, int] = {}
         self.warned = False
 
-    def run(self, waiting: list[Chunk]) -> Iterator[tuple[Chunk, ChunkResult]]:
+    def run(self, waiting: list[Chunk]) -> Generator[tuple[Chunk, ChunkResult], None, None]:
         running: dict[Any, tuple[Chunk, Chunk]] = {}
         pieces: dict[str, dict[int, ChunkResult]] = {}
         queue = [(chunk, chunk) for chunk in reversed(waiting)]
@@ -174,7 +174,7 @@ class _Dispatch:
             return empty_result(self.study, self.task, 1, "its worker died at every attempt"), []
         except (ImportError, AttributeError) as error:
             raise SchedulerError(
-                f"a worker cannot load what it is sent ({error}); install ascentwind {self.identity['ascentwind']} there"
+                f"a worker cannot load what it is sent ({error}); install this ascentwind there"
             ) from None
         self._compare(identity)
         return result, []

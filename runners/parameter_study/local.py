@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Generator, Iterable
 from concurrent.futures import ThreadPoolExecutor, as_completed
 
 from ..cores import available_cores
@@ -10,7 +10,9 @@ from ..study import Study
 from .compute import Chunk, ChunkResult, Task, compute_chunk
 
 
-def compute_locally(study: Study, task: Task, missing: Iterable[Chunk]) -> Iterator[tuple[Chunk, ChunkResult]]:
+def compute_locally(
+    study: Study, task: Task, missing: Iterable[Chunk]
+) -> Generator[tuple[Chunk, ChunkResult], None, None]:
     """Yield chunks as they are done, in any order.
 
     When the caller stops, those not yet begun are dropped.

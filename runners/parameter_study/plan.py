@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from ...model.errors import DataError
@@ -45,6 +46,13 @@ class GridQuantity(PlannedQuantity):
         if bool(self.values) == (self.linspace is not None):
             raise ValueError("needs either values = [...] or linspace = [first, last, count]")
         return self
+
+    def axis(self) -> list[float]:
+        """Return the values."""
+        if self.linspace is None:
+            return list(self.values)
+        first, last, count = self.linspace
+        return np.linspace(first, last, count).tolist()
 
 
 class SweptQuantity(PlannedQuantity):

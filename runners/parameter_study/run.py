@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Generator, Mapping
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -151,12 +151,7 @@ def _complete(
     done = sum(len(result.status) for result in found.values())
     if progress:
         progress(done, members)
-    results: Iterator[tuple[Chunk, ChunkResult]] = iter(())
-    if missing and scheduler:
-        results = compute_on_cluster(scheduler, study, task, missing)
-    elif missing:
-        results = compute_locally(study, task, missing)
-    with closing(results):  # type: ignore[arg-type]
+    with closing(_results(study, task, missing, scheduler)) as results:
         for chunk, result in results:
             try:
                 store.write(chunk, result)
@@ -169,6 +164,16 @@ def _complete(
             if progress:
                 progress(done, members)
     return [found[chunk.first] for chunk in wanted]
+
+
+def _results(
+    study: Study, task: Task, missing: list[Chunk], scheduler: str | None
+) -> Generator[tuple[Chunk, ChunkResult], None, None]:
+    """Yield the chunks as they are done."""
+    if missing and scheduler:
+        yield from compute_on_cluster(scheduler, study, task, missing)
+    elif missing:
+        yield from compute_locally(study, task, missing)
 
 
 def _dataset(

@@ -33,8 +33,7 @@ def member_values(plan: ParameterStudyPlan, quantities: Sequence[Quantity]) -> N
     UnbalancedSampleWarning
     """
     if plan.grid is not None:
-        axes = [q.values or np.linspace(*q.linspace).tolist() for q in plan.grid.quantity if q.values or q.linspace]
-        return np.array(list(product(*axes)))
+        return np.array(list(product(*(q.axis() for q in plan.grid.quantity))))
     if plan.one_at_a_time is not None:
         nominal = np.array([q.nominal for q in quantities])
         rows = np.tile(nominal, (2 * nominal.size, 1))
@@ -54,7 +53,7 @@ def dispersed(
 ) -> NDArray[np.float64]:
     """Return random members, (members, quantities): normal scores, correlated, then put on the distributions."""
     uniform = _uniform(dispersion, len(marginals))
-    scores = stats.norm.ppf(uniform) @ np.linalg.cholesky(correlation).T
+    scores = np.asarray(stats.norm.ppf(uniform) @ np.linalg.cholesky(correlation).T, float)
     return np.stack([quantile(m, scores[:, k]) for k, m in enumerate(marginals)], axis=1)
 
 
