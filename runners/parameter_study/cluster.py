@@ -126,10 +126,7 @@ class _Dispatch:
             while queue and len(running) < UNDER_WAY * max(1, self._threads()):
                 whole, part = queue.pop()
                 running[self._submit(part)] = (whole, part)
-            try:
-                done = self.distributed.wait(list(running), timeout=LOOK_SECONDS, return_when="FIRST_COMPLETED").done
-            except TimeoutError:
-                done = set()
+            done = self._done(list(running))
             if self._threads():
                 seen = time.monotonic()
             elif time.monotonic() - seen > WORKER_SECONDS:
@@ -148,6 +145,14 @@ class _Dispatch:
                 found[part.first] = result
                 if len(found) == len(whole.values):
                     yield whole, _joined([found[k] for k in sorted(found)])
+
+    def _done(self, running: list[Any]) -> set[Any]:
+        """Wait for a chunk, but not for ever."""
+        try:
+            with self.client.as_current():
+                return self.distributed.wait(running, timeout=LOOK_SECONDS, return_when="FIRST_COMPLETED").done
+        except TimeoutError:
+            return set()
 
     def _threads(self) -> int:
         return sum(w["nthreads"] for w in self.client.scheduler_info(n_workers=-1)["workers"].values())

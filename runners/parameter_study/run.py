@@ -179,7 +179,7 @@ def _results(
 def _dataset(
     study: Study, plan: ParameterStudyPlan, task: Task, values: NDArray[np.float64], found: list[ChunkResult]
 ) -> xr.Dataset:
-    sources = list(plan.sources or (*study.system.sources, COMBINED))
+    sources = [*(s for s in plan.sources or study.system.sources if s != COMBINED), COMBINED]
     mean = np.concatenate([r.mean for r in found])
     std = _std(study, sources, np.concatenate([r.variance for r in found]))
     nominal = _nominal(study, task)
