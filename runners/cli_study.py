@@ -33,19 +33,19 @@ def study(
     assert plan.vehicle is not None  # read_plan asks it of a file
     with console.status("loading and preparing code"):
         loaded = Study.load(plan.vehicle)
-    done = 0
+    started = False
     try:
         with progress_bar() as progress:
             task = progress.add_task("members", total=None)
 
             def advance(count: int, total: int) -> None:
-                nonlocal done
-                if done == 0 and count:
+                nonlocal started
+                if not started and count:
                     progress.console.print(f"{count} of {total} members were stored in {folder} before", style="dim")
-                done = count
+                started = True
                 progress.update(task, completed=count, total=total)
 
-            result = run_parameter_study(plan, folder, study=loaded, scheduler=scheduler, progress=advance)
+            result = run_parameter_study(file, folder, study=loaded, scheduler=scheduler, progress=advance)
         with console.status("first-order prediction and figures"):
             written = [folder / "study.nc", *report(result, folder, console)]
     except KeyboardInterrupt:

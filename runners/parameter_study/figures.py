@@ -33,10 +33,10 @@ def histogram_figure(result: ParameterStudy, measured: xr.Dataset, found: xr.Dat
         cumulative.step(values, 100 * steps, where="post", color=COLORS["wind"], label="members")
         if np.isfinite(sigma) and sigma > 0:
             x = np.linspace(min(values[0], centre - 3.5 * sigma), max(values[-1], centre + 3.5 * sigma), 300)
-            normal = stats.norm(centre, sigma)
             label = f"first order: σ {sigma:.3g} {unit}"
-            density.plot(x, normal.pdf(x), "--", color=COLORS[COMBINED], lw=2, label=label)
-            cumulative.plot(x, 100 * normal.cdf(x), "--", color=COLORS[COMBINED], lw=2, label="first order")
+            density.plot(x, stats.norm.pdf(x, centre, sigma), "--", color=COLORS[COMBINED], lw=2, label=label)
+            below = stats.norm.cdf(x, centre, sigma)
+            cumulative.plot(x, 100 * below, "--", color=COLORS[COMBINED], lw=2, label="first order")
         for axes in (density, cumulative):
             axes.axvline(factor * at["nominal"].item(), color="black", lw=1, ls=":", label="nominal")
             axes.set_xlabel(f"peak of mean + 3σ {words(response)} ({unit})")
@@ -71,9 +71,7 @@ def band_figure(result: ParameterStudy, found: xr.Dataset, response: str) -> Fig
         axes = figure.subplots()
         for low, high, alpha in ((1, 99, 0.15), (5, 95, 0.3)):
             edges = np.percentile(upper, [low, high], axis=0)
-            axes.fill_between(
-                time, *edges, color=COLORS["wind"], alpha=alpha, lw=0, label=f"{low} to {high} % of members"
-            )
+            axes.fill_between(time, *edges, color=COLORS["wind"], alpha=alpha, lw=0, label=f"{low} to {high} %")
         median = np.median(upper, axis=0)
         axes.plot(time, median, color=COLORS["wind"], lw=1.6, label="median", marker=marker)
         axes.plot(time, nominal, ":", color="black", lw=1.6, label="nominal", marker=marker)

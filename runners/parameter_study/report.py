@@ -141,34 +141,31 @@ def _shown(value: float, unit: str, digits: int = 4) -> str:
 
 
 def _print_spread(found: xr.Dataset, console: Console) -> None:
-    table = Table("response", "of", title=f"Spread of {found.attrs['members']} members, with 95 % intervals")
-    for column in ("nominal", "mean", "σ of the members", "first order", "ratio", "5 %", "95 %", "99 %"):
-        table.add_column(column, justify="right", no_wrap=True)
     for response in _names(found, "response"):
+        part = found.sel(response=response)
+        unit, time = part["unit"].item(), part["peak_time"].item()
+        title = f"{words(response).capitalize()} ({display(unit)[1]}) of {found.attrs['members']} members"
+        table = Table(title=f"{title}, below with 95 % intervals")
+        table.add_column("of", no_wrap=True)
+        for column in ("nominal", "mean", "σ", "σ, first order", "ratio", "5 %", "95 %", "99 %"):
+            table.add_column(column, justify="right", no_wrap=True)
         for measure in _names(found, "measure"):
-            at = found.sel(response=response, measure=measure)
-            unit = at["unit"].item()
-            time = "" if measure == PEAK else f" at {at['peak_time'].item():g} s"
-
-            def cell(name: str, at: xr.Dataset = at, unit: str = unit) -> str:
-                return _shown(at[name].item(), unit)
-
-            def ranked(percent: float, at: xr.Dataset = at, unit: str = unit) -> str:
-                value, low, high = (at[f"percentile{e}"].sel(percent=percent).item() for e in ("", "_low", "_high"))
-                return f"{_shown(value, unit)} ({_shown(low, unit)}-{_shown(high, unit)})"
-
+            at = part.sel(measure=measure)
+            numbers = {name: _shown(at[name].item(), unit, 3) for name in found.data_vars if at[name].ndim == 0}
+            ranked = [
+                _interval(*(_shown(at[f"percentile{e}"].sel(percent=p).item(), unit, 3) for e in ("", "_low", "_high")))
+                for p in (5.0, 95.0, 99.0)
+            ]
             table.add_row(
-                words(response) if measure == PEAK else "",
-                f"{LABELS[measure]}{time} ({display(unit)[1]})",
-                cell("nominal"),
-                cell("sample_mean"),
-                f"{cell('sample_std')} ({cell('sample_std_low')}-{cell('sample_std_high')})",
-                cell("first_order_std"),
+                LABELS[measure] if measure == PEAK else f"{LABELS[measure]} at {time:g} s",
+                numbers["nominal"],
+                numbers["sample_mean"],
+                _interval(numbers["sample_std"], numbers["sample_std_low"], numbers["sample_std_high"]),
+                numbers["first_order_std"],
                 _shown(at["ratio"].item(), "1", 3),
-                *(ranked(p) for p in (5.0, 95.0, 99.0)),
-                end_section=measure == "std",
+                *ranked,
             )
-    console.print(table, width=max(console.width, 170), crop=False)
+        console.print(table)
     table = Table("quantity", title="What drives the spread of the peak mean + 3σ, to first order")
     for response in _names(found, "response"):
         table.add_column(words(response), justify="right")
@@ -177,6 +174,11 @@ def _print_spread(found: xr.Dataset, console: Console) -> None:
         cells = (f"{100 * s:.1f} %" if np.isfinite(s) else "-" for s in shares.isel(quantity=q).values)
         table.add_row(str(found["quantity"].values[q]), *cells)
     console.print(table)
+
+
+def _interval(value: str, low: str, high: str) -> str:
+    """Return a number with its interval; an end that too few members leave open is not written."""
+    return f"{value}\n{'' if low == '-' else low} … {'' if high == '-' else high}"
 
 
 def _print_changes(found: xr.Dataset, console: Console) -> None:

@@ -93,16 +93,19 @@ def run_parameter_study(
         It cannot be written; what is stored stays.
     SchedulerError, NoCompilerError
     """
+    file = Path(plan) if isinstance(plan, str | Path) else None
     plan = read_plan(plan)
     if study is None:
         if plan.vehicle is None:
             raise DataError("is missing; name a shipped vehicle or a vehicle folder, or give a study", column="vehicle")
         study = Study.load(plan.vehicle)
-    quantities = resolve_quantities(study, plan)
-    values = member_values(plan, quantities)
-    task = _task(study, plan, quantities)
-    _check_sources(study, plan)
-    _check_size(study, task, len(values))
+    try:
+        quantities = resolve_quantities(study, plan)
+        values = member_values(plan, quantities)
+        task = _task(study, plan, quantities)
+        _check_size(study, task, len(values))
+    except DataError as error:
+        raise DataError(error.why, file=error.file or file, column=error.column) from None
     folder = Path(folder)
     with open_store(folder, identity_of(study, plan, task, values)) as store:
         found = _complete(store, study, task, list(chunks(values)), len(values), scheduler, progress)
@@ -118,13 +121,11 @@ def _task(study: Study, plan: ParameterStudyPlan, quantities: tuple[Quantity, ..
     times = sorted(set(parse_times(text)))
     study._check_times(times)
     SweepOptions(plan.relative_tolerance)
-    return Task(quantities, tuple(times), tuple(study._responses(plan.responses)), plan.relative_tolerance)
-
-
-def _check_sources(study: Study, plan: ParameterStudyPlan) -> None:
+    known = (*study.system.sources, COMBINED)
     for source in plan.sources or ():
-        if source not in (*study.system.sources, COMBINED):
-            raise UnknownNameError("noise source", source, (*study.system.sources, COMBINED))
+        if source not in known:
+            raise UnknownNameError("noise source", source, known)
+    return Task(quantities, tuple(times), tuple(study._responses(plan.responses)), plan.relative_tolerance)
 
 
 def _check_size(study: Study, task: Task, members: int) -> None:

@@ -55,7 +55,7 @@ def spread(result: ParameterStudy) -> xr.Dataset:
     }
     found["ratio"] = _divided(found["sample_std"], predicted)
     value, low, high = percentiles(samples)
-    data = xr.Dataset(
+    return xr.Dataset(
         {
             "nominal": measured["nominal"],
             **{name: (dims, array) for name, array in found.items()},
@@ -70,7 +70,6 @@ def spread(result: ParameterStudy) -> xr.Dataset:
         {"percent": list(PERCENT), "quantity": result.data["quantity"].values},
         {"members": n, "confidence": CONFIDENCE},
     )
-    return data
 
 
 def _divided(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
