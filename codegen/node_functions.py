@@ -106,7 +106,8 @@ def _with_numbers(system: LinearSystem) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX, ca.
     """Return x', y and the known inputs in terms of numbers, these as expressions of p, and their symbols."""
     given = [system.derivative, system.output, system.input_values]
     expressions, symbols, hoisted = ca.extract_parametric(given, system.p)
-    bare = [p for p in ca.vertsplit(system.p) if any(ca.depends_on(e, p) for e in expressions)] if system.p.numel() else []
+    free = {symbol.__hash__() for symbol in ca.symvar(ca.veccat(*expressions))}
+    bare = [system.p[i] for i in range(system.p.numel()) if system.p[i].__hash__() in free]
     renamed = [ca.SX.sym(p.name()) for p in bare]
     derivative, output, inputs = ca.substitute(
         [ca.SX(e) for e in expressions], [ca.vertcat(ca.SX(0, 1), *bare)], [ca.vertcat(ca.SX(0, 1), *renamed)]

@@ -1,6 +1,6 @@
 """Gauss-Legendre collocation of the linear system and its adjoint on one grid.
 
-Three stages, order six, A-stable and symplectic: it keeps quadratic invariants, so that the discrete adjoint of the
+Four stages, order eight, A-stable and symplectic: it keeps quadratic invariants, so that the discrete adjoint of the
 method is the method applied to the adjoint, and a gradient computed with it is the exact derivative of the
 discretised variance (Sanz-Serna 2016, SIAM Review 58, 3-33).
 """
@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import ctypes
 import logging
-from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,20 +19,21 @@ from scipy.linalg import get_lapack_funcs
 from ..codegen.elimination import elimination_plan
 from ..codegen.node_functions import NodeMatrix
 from ..model.errors import IntegrationError
-from .collocation_grid import WEIGHTS, Grid
+from .collocation_grid import NODES, STAGES, WEIGHTS, Grid
 
 log = logging.getLogger(__name__)
 
 _factorise, _solve = get_lapack_funcs(("getrf", "getrs"), dtype=np.float64)
-_R = np.sqrt(15.0)
-STAGES = np.array(
-    [
-        [5 / 36, 2 / 9 - _R / 15, 5 / 36 - _R / 30],
-        [5 / 36 + _R / 24, 2 / 9, 5 / 36 - _R / 24],
-        [5 / 36 + _R / 30, 2 / 9 + _R / 15, 5 / 36],
-    ]
-)
+# a, the integrals of the Lagrange polynomials of the nodes from 0 to each node
+TABLEAU = np.linalg.solve(
+    np.vander(NODES, STAGES, increasing=True).T,
+    (NODES[:, None] ** np.arange(1, STAGES + 1) / np.arange(1, STAGES + 1)).T,
+).T
 SINGULAR = 1  # as in the template
+
+
+class NearlySingularError(IntegrationError):
+    """Elimination without exchanges met a pivot that it cannot divide by."""
 
 
 class Collocation:
@@ -43,7 +44,7 @@ class Collocation:
     grid : Grid
         Of k steps.
     A : NodeMatrix
-        State matrix at the 3 k nodes.
+        State matrix at the 4 k nodes.
 
     Raises
     ------
@@ -53,12 +54,12 @@ class Collocation:
     def __init__(self, grid: Grid, A: NodeMatrix):
         self.grid = grid
         k, n = grid.steps.size, A.pattern.size1()
-        self._n, self._A = n, A.dense.reshape(k, 3, n, n)
+        self._n, self._A = n, A.dense.reshape(k, STAGES, n, n)
         self._factors = []
         for step, h in enumerate(grid.steps):
             # N = I - h A (a x I), the equations of the stage derivatives
-            blocks = -h * STAGES[:, None, :, None] * self._A[step][:, :, None, :]
-            matrix = blocks.reshape(3 * n, 3 * n) + np.eye(3 * n)
+            blocks = -h * TABLEAU[:, None, :, None] * self._A[step][:, :, None, :]
+            matrix = blocks.reshape(STAGES * n, STAGES * n) + np.eye(STAGES * n)
             lu, pivots, info = _factorise(matrix.T)  # of the transpose, whose memory order LAPACK takes as it is
             if info != 0:
                 raise IntegrationError(f"the collocation equations are singular at {grid.edges[step]:g} s")
@@ -70,12 +71,12 @@ class Collocation:
         Parameters
         ----------
         start : (n,) array
-        forcing : (s, 3, n) array
+        forcing : (s, 4, n) array
             At the nodes of the first s steps.
 
         Returns
         -------
-        stages : (s, 3, n) array
+        stages : (s, 4, n) array
         edges : (s + 1, n) array
             At the ends of the steps.
         """
@@ -83,8 +84,8 @@ class Collocation:
         for step, force in enumerate(forcing):
             x, h, (lu, pivots) = edges[-1], self.grid.steps[step], self._factors[step]
             right = (self._A[step] @ x + force).ravel()
-            rates = _solve(lu, pivots, right, trans=1)[0].reshape(3, self._n)
-            stages[step] = x + h * (STAGES @ rates)
+            rates = _solve(lu, pivots, right, trans=1)[0].reshape(STAGES, self._n)
+            stages[step] = x + h * (TABLEAU @ rates)
             edges.append(x + h * (WEIGHTS @ rates))
         return stages, np.array(edges)
 
@@ -95,46 +96,57 @@ class Collocation:
         edges[count] = end
         for step in reversed(range(count)):
             a, h, (lu, pivots) = edges[step + 1], self.grid.steps[step], self._factors[step]
-            right = np.outer(WEIGHTS, a) + h * STAGES.T @ (WEIGHTS[:, None] * forcing[step])
-            weighted = _solve(lu, pivots, right.ravel(), trans=0)[0].reshape(3, self._n)
+            right = np.outer(WEIGHTS, a) + h * TABLEAU.T @ (WEIGHTS[:, None] * forcing[step])
+            weighted = _solve(lu, pivots, right.ravel(), trans=0)[0].reshape(STAGES, self._n)
             stages[step] = weighted / WEIGHTS[:, None]
             edges[step] = a + h * (np.einsum("iab,ia->b", self._A[step], weighted) + WEIGHTS @ forcing[step])
         return stages, edges
 
 
 class CompiledCollocation:
-    """The same in C by sparse elimination without exchanges; where that fails, LAPACK takes over."""
+    """The same in C by sparse elimination without exchanges.
+
+    Raises
+    ------
+    NearlySingularError
+        If a pivot is; LAPACK exchanges rows.
+    """
 
     def __init__(self, grid: Grid, A: NodeMatrix, library: Path):
-        self.grid, self.A = grid, A
+        self.grid, plan = grid, elimination_plan(A.pattern)
         self._code = ctypes.CDLL(str(library))
-        given = (elimination_plan(A.pattern), grid.steps, A.values, np.append(STAGES.ravel(), WEIGHTS))
-        self._arrays = tuple(np.ascontiguousarray(x) for x in given)
-
-    @cached_property
-    def _with_exchanges(self) -> Collocation:
-        return Collocation(self.grid, self.A)
+        given = (plan, grid.steps, A.values, np.append(TABLEAU.ravel(), WEIGHTS))
+        self._arrays = (*map(np.ascontiguousarray, given), np.empty((grid.steps.size, plan[1], STAGES**2)))
+        code = self._code.collocation_factorise(ctypes.c_long(grid.steps.size), *map(_pointer, self._arrays))
+        if code == SINGULAR:
+            raise NearlySingularError("a pivot of the collocation equations is nearly singular")
+        if code:
+            raise IntegrationError("there is not enough memory for the collocation; free some")
 
     def forward(self, start: NDArray, forcing: NDArray) -> tuple[NDArray, NDArray]:
-        return self._solve("forward", start, forcing)
+        return self._solve(self._code.collocation_forward, start, forcing)
 
     def backward(self, end: NDArray, forcing: NDArray) -> tuple[NDArray, NDArray]:
-        return self._solve("backward", end, forcing)
+        return self._solve(self._code.collocation_backward, end, forcing)
 
-    def _solve(self, direction: str, first: NDArray, forcing: NDArray) -> tuple[NDArray, NDArray]:
+    def _solve(self, code: Any, first: NDArray, forcing: NDArray) -> tuple[NDArray, NDArray]:
         state, stages = np.array(first, float), np.empty(forcing.shape)
         edges = np.empty((forcing.shape[0] + 1, state.size))
-        arrays = (*self._arrays, np.ascontiguousarray(forcing), state, stages, edges)
-        code = getattr(self._code, f"collocation_{direction}")
-        result = code(ctypes.c_long(forcing.shape[0]), *(x.ctypes.data_as(ctypes.c_void_p) for x in arrays))
-        if result == SINGULAR:
-            log.info("a pivot of the collocation is nearly singular: the equations are solved with exchanges")
-            return getattr(self._with_exchanges, direction)(first, forcing)
-        if result:
-            raise IntegrationError("there is not enough memory for the collocation; free some")
+        arrays = (*self._arrays, np.ascontiguousarray(forcing), state, stages, edges, np.empty(STAGES * state.size))
+        code.restype = None
+        code(ctypes.c_long(forcing.shape[0]), *map(_pointer, arrays))
         return stages, edges
+
+
+def _pointer(array: NDArray) -> ctypes.c_void_p:
+    return array.ctypes.data_as(ctypes.c_void_p)
 
 
 def collocation(grid: Grid, A: NodeMatrix, library: Path | None) -> Collocation | CompiledCollocation:
     """Return the solver of a grid, compiled where there is a library."""
-    return Collocation(grid, A) if library is None else CompiledCollocation(grid, A, library)
+    if library is not None:
+        try:
+            return CompiledCollocation(grid, A, library)
+        except NearlySingularError as error:
+            log.info("%s: solved by LAPACK, which exchanges rows", error)
+    return Collocation(grid, A)

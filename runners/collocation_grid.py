@@ -12,15 +12,16 @@ from numpy.typing import NDArray
 from ..model.system import LinearSystem
 from ..model.tables import TableGroup
 
-STEP = 0.05  # s, the longest
-PHASE = 0.35  # rad, the longest step of the fastest lightly damped root: its error is then 6e-9 rad
+STEP = 0.04  # s, the longest
+PHASE = 0.8  # rad, the longest step of the fastest lightly damped root: its error is then 5e-9 rad
 LIGHT = 0.3  # damping ratio below which a root rings on through the flight
-FIRST_STEP = 5e-4  # s, beside the ends and discontinuities, where filter poles near 100 rad/s leave fast transients
-GROWTH = 0.15  # of the step with distance from there, s/s
+FIRST_STEP = 2e-3  # s, beside the ends and discontinuities, where filter poles near 100 rad/s leave fast transients
+GROWTH = 0.3  # of the step with distance from there, s/s
 
-_R = np.sqrt(15.0)
-NODES = np.array([0.5 - _R / 10, 0.5, 0.5 + _R / 10])
-WEIGHTS = np.array([5.0, 8.0, 5.0]) / 18
+FINE = 1.3  # spacing of knots, in steps, below which a table is taken as smooth
+STAGES = 4  # of a step, order 8
+_legendre, _weights = np.polynomial.legendre.leggauss(STAGES)
+NODES, WEIGHTS = 0.5 * (1 + _legendre), 0.5 * _weights
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,12 +42,12 @@ class Grid:
 
     @property
     def nodes(self) -> NDArray[np.float64]:
-        """Collocation times, (k, 3)."""
+        """Collocation times, (k, 4)."""
         return self.edges[:-1, None] + self.steps[:, None] * NODES
 
     @property
     def weights(self) -> NDArray[np.float64]:
-        """Quadrature weights of the nodes, s, (k, 3)."""
+        """Quadrature weights of the nodes, s, (k, 4)."""
         return self.steps[:, None] * WEIGHTS
 
 
@@ -113,7 +114,7 @@ def _knot_times(groups: Sequence[TableGroup], begin: float, end: float, step: fl
     found = [np.zeros(0)]
     fine = np.linspace(begin, end, 2 + int((end - begin) / (0.25 * step)))
     for group in groups:
-        if np.median(np.diff(group.knots)) <= step and group.argument == "time":
+        if np.median(np.diff(group.knots)) <= FINE * step and group.argument == "time":
             continue
         if group.argument == "time":
             found.append(group.knots)

@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 from ..codegen.compiled import ExecutableSystem
 from ..codegen.node_functions import NodeFunctions, NodeMatrix
 from .collocation import Collocation, CompiledCollocation, collocation
-from .collocation_grid import Grid, collocation_grid, longest_step, tables_at
+from .collocation_grid import STAGES, Grid, collocation_grid, longest_step, tables_at
 
 FROZEN = 7  # times at which the roots of A are looked at
 
 
 @dataclass(frozen=True, eq=False)
 class FlightNodes:
-    """A system on a grid of k steps with 3 k nodes.
+    """A system on a grid of k steps with 4 k nodes.
 
     Attributes
     ----------
@@ -29,7 +29,7 @@ class FlightNodes:
     grid : Grid
     numbers : (n_z,) array
         Of the parameters in force.
-    tables : (3 k, n_v) array
+    tables : (4 k, n_v) array
         Values at the nodes.
     matrices : dict of str to NodeMatrix
         A, B, C, E, G and the known inputs at the nodes.
@@ -66,7 +66,7 @@ class FlightNodes:
 
     @cached_property
     def mean(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """States of the mean response at the nodes (k, 3, n) and at the edges (k + 1, n)."""
+        """States of the mean response at the nodes (k, 4, n) and at the edges (k + 1, n)."""
         n = len(self.executable.system.states)
         known = self.matrices["E"].times(self.matrices["inputs"].dense[..., 0])
-        return self.solver.forward(np.zeros(n), known.reshape(-1, 3, n))
+        return self.solver.forward(np.zeros(n), known.reshape(-1, STAGES, n))

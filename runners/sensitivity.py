@@ -129,7 +129,7 @@ def sensitivity(
 ) -> xr.Dataset:
     """See :meth:`Study.sensitivity`."""
     request = Request.of(study, response, source, quantity)
-    rows = _parameter_rows(study.system, parameters)
+    rows = parameter_rows(study.system, parameters)
     at_peak = isinstance(time, str)
     if isinstance(time, str):
         if time != "peak":
@@ -138,8 +138,7 @@ def sensitivity(
     else:
         time, at_limit = float(time), False
     study._check_times([time])
-    if time <= study.system.start:
-        raise TimeRangeError(f"at its start, {time:g} s, a system has no history to differentiate; choose a later time")
+    check_end_time(study, time)
     warn_if_unstable(study.executable, time)
     pair = request.pair(study, time)
     gradient = pair.gradient(*request.factors(pair))
@@ -172,13 +171,30 @@ def sensitivity(
         "mean": pair.mean,
         "at_peak": int(at_peak),
         "peak_at_end_of_range": int(at_limit),
-        "engine": "collocation, Gauss-Legendre of order 6",
-        "steps": pair.times.size // 3,
+        "engine": "collocation, Gauss-Legendre of order 8",
+        "steps": pair.steps,
     }
     return dataset
 
 
-def _parameter_rows(system: LinearSystem, wanted: Iterable[str] | None) -> list[int]:
+def check_end_time(study: Study, time: float) -> None:
+    """Refuse the start of a system.
+
+    Raises
+    ------
+    TimeRangeError
+    """
+    if time <= study.system.start:
+        raise TimeRangeError(f"at its start, {time:g} s, a system has no history to differentiate; choose a later time")
+
+
+def parameter_rows(system: LinearSystem, wanted: Iterable[str] | None) -> list[int]:
+    """Return the numbers of parameters by name, all without names.
+
+    Raises
+    ------
+    UnknownNameError, StructuralParameterError
+    """
     names = system.parameter_names
     if wanted is None:
         return list(range(len(names)))

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ..model.assemble import MEAN_TABLES
 from ..model.system import LinearSystem
-from .collocation_grid import tables_at
+from .collocation_grid import STAGES, tables_at
 from .flight_nodes import FlightNodes
 from .integration import intervals
 
@@ -82,22 +82,24 @@ class AdjointPair:
         system, executable = self.executable.system, self.executable
         self.response, self.time, self.sources = response, time, sources
         n, steps = len(system.states), int(np.searchsorted(flight.grid.edges, time))
+        self.steps = steps
         self.mask = np.array([float(noise.source in sources) for noise in system.noises])
         last = intervals(system, system.start, time)[-1]
         self._low, self.end = last.low, last.high  # the end from the left, where it is a discontinuity
         self.times, self.weights = flight.grid.nodes[:steps].ravel(), flight.grid.weights[:steps].ravel()
-        self.tables, self.tables_at_end = flight.tables[: 3 * steps], tables_at(executable.groups, np.array([self.end]))[0]
-        self.matrices = {name: matrix.first(3 * steps) for name, matrix in flight.matrices.items()}
+        self.tables = flight.tables[: STAGES * steps]
+        self.tables_at_end = tables_at(executable.groups, np.array([self.end]))[0]
+        self.matrices = {name: matrix.first(STAGES * steps) for name, matrix in flight.matrices.items()}
         self.at_end = executable.matrices(time, last.low, last.high)
 
-        still = np.zeros((steps, 3, n))
+        still = np.zeros((steps, STAGES, n))
         stages, edges = flight.solver.backward(self.at_end["C"][response], still)
         self.adjoint, self.adjoint_at_start = stages.reshape(-1, n), edges[0]
         B = self.matrices["B"]
         white = self.mask * B.transposed_times(self.adjoint)
         covariance = sum((system.start_covariance_matrix(s, executable.parameters) for s in sources), np.zeros((n, n)))
         start = covariance @ self.adjoint_at_start
-        stages, edges = flight.solver.forward(start, B.times(white).reshape(steps, 3, n))
+        stages, edges = flight.solver.forward(start, B.times(white).reshape(steps, STAGES, n))
         self.dual, self.dual_at_end = stages.reshape(-1, n), edges[-1]
         self.variance = float(self.weights @ np.sum(white**2, axis=1) + self.adjoint_at_start @ start)
         self.states, self.states_at_end = flight.mean[0][:steps].reshape(-1, n), flight.mean[1][steps]
@@ -132,14 +134,13 @@ class AdjointPair:
         at = (self.weights, self.times, self.tables, self.flight.numbers)
         at_end = (np.ones(1), np.array([self.end]), self.tables_at_end[None], self.flight.numbers)
         selected, still = np.eye(r)[self.response], np.zeros((1, n))
-        numbers, along, last = np.zeros(self.flight.numbers.size), np.zeros_like(self.tables), np.zeros(system.v.numel())
+        numbers, along = np.zeros(self.flight.numbers.size), np.zeros_like(self.tables)
+        last = np.zeros(system.v.numel())
         at_start = np.zeros(p.size)
         adjoint = mean_factor * self.adjoint
         on_outputs, on_outputs_end = np.zeros((self.times.size, r)), mean_factor * selected
 
-        def add(
-            inside: tuple[NDArray, NDArray], end: tuple[NDArray, NDArray], factor: float
-        ) -> None:
+        def add(inside: tuple[NDArray, NDArray], end: tuple[NDArray, NDArray], factor: float) -> None:
             numbers[:] += factor * (inside[0] + end[0])
             along[:] += factor * inside[1]
             last[:] += factor * end[1][0]
@@ -153,7 +154,7 @@ class AdjointPair:
             at_start = variance_factor * self._start_gradient(system, p)
             path = self._mean_path(along, last)
             if path is not None:
-                stages, _ = self.flight.solver.backward(path.on_states_at_end, path.on_states.reshape(-1, 3, n))
+                stages, _ = self.flight.solver.backward(path.on_states_at_end, path.on_states.reshape(-1, STAGES, n))
                 adjoint = adjoint + stages.reshape(-1, n)
                 on_outputs, on_outputs_end = on_outputs + path.on_outputs, on_outputs_end + path.on_outputs_at_end
         if adjoint.any() or on_outputs_end.any():

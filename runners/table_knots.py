@@ -127,7 +127,9 @@ def _shape(table: Table, knots: NDArray) -> tuple[bytes, bytes, str, tuple[float
 
 
 @lru_cache(maxsize=64)
-def _row_cubics(argument: bytes, values: bytes, interpolation: str, breaks: tuple[float, ...], knots: bytes) -> NDArray[np.float64]:
+def _row_cubics(
+    argument: bytes, values: bytes, interpolation: str, breaks: tuple[float, ...], knots: bytes
+) -> NDArray[np.float64]:
     """Return the cubics of every row in the k intervals between knots, (4 k, rows), lowest power first."""
     x, ends = np.frombuffer(argument), np.frombuffer(knots)
     found = np.zeros((ends.size - 1, ORDER, x.size))
