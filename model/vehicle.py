@@ -13,6 +13,7 @@ from .tables import Table
 from .vehicle_file import (
     BendingEntry,
     NoiseEntry,
+    SensorFeedbackEntry,
     SloshEntry,
     TableEntry,
     TransferFunctionEntry,
@@ -38,6 +39,7 @@ TRAJECTORY = (
 PROPULSION = (("thrust", "N", "0"), ("control_thrust", "N", "0"))
 AERODYNAMICS = (("normal_force_slope", "1/rad", ""), ("center_of_pressure", "m", ""))
 GAINS = (("attitude_factor", "1", ""), ("rate_factor", "1", ""))
+LOAD_RELIEF = ("accelerometer", "angle_of_attack")  # sections of [control] that a vehicle may have
 SLOSH = (("mass", "kg", "+"), ("frequency", "rad/s", "+"), ("attach_point", "m", ""))
 WIND = (("mean", "m/s", ""), ("standard_deviation", "m/s", "+"))
 
@@ -103,6 +105,11 @@ class Vehicle:
         """T1 (attitude), T2 (attitude rate) and T3 (actuator), equations 4-5 to 4-7."""
         return {"T1": self.file.control.T1, "T2": self.file.control.T2, "T3": self.file.control.T3}
 
+    @property
+    def load_relief(self) -> dict[str, SensorFeedbackEntry]:
+        """Feedback of load-relief sensors, by name; empty for a vehicle that has none."""
+        return load_relief_entries(self.file)
+
 
 def load_vehicle(folder: Path) -> Vehicle:
     """Load a vehicle folder.
@@ -130,6 +137,18 @@ def load_vehicle(folder: Path) -> Vehicle:
     ):
         reader.add(name, getattr(file.tables, name), columns)
     reader.add("control.gains", file.control.gains, GAINS, "control.")
+    for sensor, entry in load_relief_entries(file).items():
+        if entry.schedule:
+            reader.add(f"control.{sensor}.schedule", entry.schedule, (("factor", "1", ""),), f"control.{sensor}.")
+        if entry.modes:
+            columns = _mode_columns(len(file.bending))
+            reader.add(f"load_relief.{sensor}.modes", entry.modes, columns, f"control.{sensor}.")
+        elif file.bending:
+            raise DataError(
+                "is missing; name a table with displacement_i [1] and slope_i [1/m] of each bending mode at the sensor",
+                file=toml,
+                column=f"control.{sensor}.modes",
+            )
     tanks = [tank.name for tank in file.slosh]
     if len(set(tanks)) < len(tanks):
         raise DataError("two slosh tanks have the same name; rename one", file=toml, column="slosh")
@@ -150,7 +169,7 @@ def load_vehicle(folder: Path) -> Vehicle:
                     f"there is no table '{table}'{suggestion(table, reader.tables)}", file=toml, column=f"noise.{name}"
                 )
     wind = _load_wind(folder, file.wind, reader)
-    timed = [s for s in reader.sources if s.name not in ("wind", "wind.filter", "control.gains")]
+    timed = [s for s in reader.sources if not s.name.startswith(("wind", "control."))]
     first, last = max(timed, key=lambda s: s.first), min(timed, key=lambda s: s.last)
     start = file.start_time_s
     if start < first.first:
@@ -249,6 +268,17 @@ class _Reader:
                     "later or set interpolation = 'pchip'",
                     time=float(times[int(np.argmin(rate))]),
                 )
+
+
+def load_relief_entries(file: VehicleFile) -> dict[str, SensorFeedbackEntry]:
+    """Return the load-relief sections that a vehicle file has, by sensor."""
+    entries = {sensor: getattr(file.control, sensor) for sensor in LOAD_RELIEF}
+    return {sensor: entry for sensor, entry in entries.items() if entry is not None}
+
+
+def _mode_columns(modes: int):
+    names = [(f"displacement_{i}", f"slope_{i}") for i in range(1, modes + 1)]
+    return tuple(column for y, slope in names for column in ((y, "1", ""), (slope, "1/m", "")))
 
 
 def _bending_columns(tanks: list[str]):
