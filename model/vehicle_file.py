@@ -208,7 +208,12 @@ class VehicleFile(Section):
 
 
 def read_vehicle_file(file: Path) -> VehicleFile:
-    """Read and check a vehicle's TOML file.
+    """Read and check a vehicle's TOML file; errors as :func:`read_section_file`."""
+    return read_section_file(file, VehicleFile)
+
+
+def read_section_file[S: Section](file: Path, model: type[S]) -> S:
+    """Read and check a TOML file against what it may hold.
 
     Raises
     ------
@@ -222,13 +227,13 @@ def read_vehicle_file(file: Path) -> VehicleFile:
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise DataError(f"is not valid TOML: {error}", file=file) from None
     try:
-        return VehicleFile.model_validate(data)
+        return model.model_validate(data)
     except ValidationError as error:
         first = error.errors()[0]
         location = [str(part) for part in first["loc"]]
         key = ".".join(location)
         if first["type"] == "extra_forbidden":
-            section = _section(VehicleFile, location[:-1])
+            section = _section(model, location[:-1])
             why = f"is not a key here{suggestion(location[-1], section)}"
         elif first["type"] == "missing":
             why = "is missing; add it"
