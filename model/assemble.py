@@ -12,7 +12,9 @@ from . import bending, load_relief, rigid_body, slosh
 from .control import TransferFunction, transfer_function, transfer_function_symbols
 from .coupling import accelerations
 from .errors import DataError
-from .loads import bending_moment
+from .load_components import load_components
+from .loads import bending_moment, slosh_reaction, typical_moment
+from .local_aerodynamics import local_bending_moment, local_forces
 from .noise import NoiseProcess, noise_process
 from .symbols import ParameterSymbols, TableSymbols
 from .system import LinearSystem, Noise, Output, State
@@ -37,8 +39,9 @@ SCALES = {
     "bending_rate": 0.5,
     "slosh": 0.5,
     "slosh_rate": 1.0,
-    "bending_moment": 1e7,
     "dynamic_pressure_times_angle_of_attack": 1e3,
+    "bending_acceleration": 3.0,
+    "slosh_acceleration": 3.0,
 }
 
 
@@ -105,7 +108,7 @@ def assemble(vehicle: Vehicle, wind_start_covariance: np.ndarray) -> LinearSyste
     noises = {n: noise_process(n, e, parameters) for n, e in vehicle.noise.items()}
     sigma_scale = parameters.add("wind.sigma_scale", 1.0, "1", "factor on the wind's standard deviation")
     mean_scale = parameters.add("wind.mean_scale", 1.0, "1", "factor on the mean wind")
-    sensors = load_relief.sensor_symbols(vehicle.load_relief, modes, tables, parameters)
+    sensors = load_relief.sensor_symbols(vehicle.file.control.load_relief, modes, tables, parameters)
 
     lateral_velocity, attitude, attitude_rate = (
         ca.SX.sym(n) for n in ("lateral_velocity", "attitude", "attitude_rate")
@@ -127,6 +130,11 @@ def assemble(vehicle: Vehicle, wind_start_covariance: np.ndarray) -> LinearSyste
     slosh_mass = slosh.tank_column(tables, tanks, "mass")
     if options.full_coupling:
         moment += tables["axial_acceleration"] * ca.sum1(slosh_mass * xi)
+    force = rigid_body.lateral_force(tables, area, alpha, beta, attitude)
+    modal_force = bending.generalized_force(tables, area, bending_damping, eta, eta_rate, alpha, beta)
+    if options.local_angle_of_attack:
+        local = local_forces(tables, area, attitude_rate, eta, eta_rate)
+        force, moment, modal_force = force + local.force, moment + local.moment, modal_force + local.modal
     solved = accelerations(
         mass=tables["mass"],
         inertia=tables["moment_of_inertia"],
@@ -134,10 +142,9 @@ def assemble(vehicle: Vehicle, wind_start_covariance: np.ndarray) -> LinearSyste
         slosh_mass=slosh_mass,
         arms=slosh.attach_arms(tables, tanks),
         displacements=bending.displacements(tables, modes, tanks),
-        force=rigid_body.lateral_force(tables, area, alpha, beta, attitude),
+        force=force,
         moment=moment,
-        modal_force=bending.generalized_force(tables, area, bending_damping, eta, eta_rate, alpha, beta)
-        + slosh.slosh_stiffness_force(tables, tanks, slopes, xi),
+        modal_force=modal_force + slosh.slosh_stiffness_force(tables, tanks, slopes, xi),
         slosh_forcing=slosh.slosh_forcing(tables, tanks, slosh_damping, xi, xi_rate, attitude, eta, slopes),
         full=options.full_coupling,
     )
@@ -168,13 +175,17 @@ def assemble(vehicle: Vehicle, wind_start_covariance: np.ndarray) -> LinearSyste
         (wind.states, wind.derivative, _numbered("wind", wind.states.numel(), "1", 1.0)),
         *((p.state, p.derivative, [State(f"deviation_{n}")] * p.state.numel()) for n, p in noises.items()),
     ]
-    outputs: list[tuple[Output, ca.SX]] = [
-        (
-            Output(load.output, "N m", SCALES["bending_moment"], f"B.M. at station {load.station_m:g} m"),
-            bending_moment(tables, load.output, tanks, alpha, beta, solved.bending, solved.slosh),
-        )
-        for load in vehicle.file.loads
-    ]
+    outputs: list[tuple[Output, ca.SX]] = []
+    for load in vehicle.file.loads:
+        value = bending_moment(tables, load.output, tanks, alpha, beta, solved.bending, solved.slosh)
+        if options.local_angle_of_attack:
+            value += local_bending_moment(tables, load.output, attitude_rate, eta, eta_rate)
+        if options.slosh_reaction:
+            assert load.forward_of_gimbal_m is not None  # checked by load_vehicle
+            value += slosh_reaction(tables, load.output, tanks, load.forward_of_gimbal_m, xi, solved.slosh)
+        scale = typical_moment(vehicle.tables[f"loads.{load.output}.angle_of_attack"])
+        output = Output(load.output, "N m", scale, f"B.M. at station {load.station_m:g} m")
+        outputs.append((output, value))
     outputs.append((Output("angle_of_attack", "rad", SCALES["angle"], "alpha"), alpha))
     outputs.append((Output("engine_angle", "rad", SCALES["angle"], "beta"), beta))
     for extra in dict.fromkeys(options.extra_outputs):
@@ -184,6 +195,8 @@ def assemble(vehicle: Vehicle, wind_start_covariance: np.ndarray) -> LinearSyste
             outputs.append((Output(extra, "m", SCALES["lateral_position"], "Y"), drift))
         elif extra == "drift_rate":
             outputs.append((Output(extra, "m/s", SCALES["lateral_velocity"], "Y'"), lateral_velocity))
+        elif extra == "load_components":
+            outputs += load_components(tanks, SCALES, attitude_rate, eta, eta_rate, solved.bending, xi, solved.slosh)
         else:
             q_alpha = tables["dynamic_pressure"] * alpha
             outputs.append((Output(extra, "Pa rad", SCALES[extra], "q alpha"), q_alpha))
@@ -304,7 +317,9 @@ def _start_covariance(
 
 def _structure(vehicle: Vehicle, states: Sequence[State], groups: Sequence[TableGroup]) -> dict[str, str]:
     orders = (f"{n} {len(e.denominator) - 1}" for n, e in vehicle.transfer_functions.items())
-    relief = ", ".join(f"{n} of order {len(e.filter.denominator) - 1}" for n, e in vehicle.load_relief.items())
+    relief = ", ".join(
+        f"{n} of order {len(e.filter.denominator) - 1}" for n, e in vehicle.file.control.load_relief.items()
+    )
     return {
         **({"load relief": relief} if relief else {}),
         "bending modes": str(len(vehicle.bending)),
@@ -315,6 +330,8 @@ def _structure(vehicle: Vehicle, states: Sequence[State], groups: Sequence[Table
         "loads": ", ".join(load.output for load in vehicle.file.loads),
         "extra outputs": ", ".join(vehicle.file.options.extra_outputs) or "none",
         "full coupling": str(vehicle.file.options.full_coupling).lower(),
+        **({"local angle of attack": "true"} if vehicle.file.options.local_angle_of_attack else {}),
+        **({"slosh reaction": "true"} if vehicle.file.options.slosh_reaction else {}),
         "states": str(len(states)),
         "table lengths": ", ".join(f"{g.name} {len(g.names)} x {g.knots.size}" for g in groups),
     }

@@ -1,6 +1,7 @@
 """Load relief: feedback of a body-mounted accelerometer and of a measured angle of attack into the engine command.
 
-beta = T3(s) { K1 T1(s) phi_m + K2 T2(s) phidot_m + K_A g_A F_A(s) a_A + K_a g_a F_a(s) alpha_s } + sum_j Y'_j(X_E) eta_j
+beta = T3(s) { K1 T1(s) phi_m + K2 T2(s) phidot_m + K3 F_A(s) a_A + K4 F_a(s) alpha_s } + sum_j Y'_j(X_E) eta_j,
+K3 and K4 a gain times a schedule over flight time,
 
     a_A = Y'' - (F_TX - F_AX) / m phi_Z + (X_A - X_CG) phi_Z'' + sum_j [Y_j(X_A) eta_j'' - A_X Y'_j(X_A) eta_j]
     alpha_s = phi_Z + sum_j Y'_j(X_s) eta_j + [W - Y' - (X_s - X_CG) phi_Z' - sum_j Y_j(X_s) eta_j'] / V_RS
@@ -23,6 +24,7 @@ from .system import State
 from .vehicle_file import SensorFeedbackEntry
 
 GAIN_UNITS = {"accelerometer": "rad s2/m", "angle_of_attack": "1"}
+SCHEDULE_COLUMNS = (("factor", "1", ""),)
 SIGNALS = {"accelerometer": ("m/s2", 1.0), "angle_of_attack": ("rad", 0.02)}  # unit and typical size
 
 
@@ -101,6 +103,12 @@ def sensed_angle_of_attack(
     arm = sensor.position - tables["center_of_gravity"]
     motion = arm * attitude_rate + sensor.displacement.T @ eta_rate
     return angle_of_attack + sensor.slope.T @ eta - motion / tables["relative_velocity"]
+
+
+def mode_columns(modes: int) -> tuple[tuple[str, str, str], ...]:
+    """Return the columns of a sensor's table of bending modes: name, unit, sign."""
+    names = [(f"displacement_{i}", f"slope_{i}") for i in range(1, modes + 1)]
+    return tuple(column for y, slope in names for column in ((y, "1", ""), (slope, "1/m", "")))
 
 
 def filter_states(name: str, filtered: TransferFunction) -> list[State]:

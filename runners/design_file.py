@@ -10,7 +10,7 @@ from pydantic import Field
 
 from ..model.errors import DataError, UnknownNameError
 from ..model.shipped import find_vehicle
-from ..model.vehicle_file import Section, read_section_file
+from ..model.toml_file import Section, read_toml
 from .design_problem import LoadReliefProblem
 from .study import Study
 from .times import parse_times
@@ -91,7 +91,7 @@ def load_design(file: Path) -> DesignTask:
         The file and key at fault.
     DesignProblemError, UnknownNameError, ParameterValueError, TimeRangeError
     """
-    entry = read_section_file(file, DesignEntry)
+    entry = read_toml(file, DesignEntry)
     vehicle = file.parent if entry.vehicle is None else file.parent / entry.vehicle
     study = Study.load(vehicle if vehicle.is_dir() else str(entry.vehicle))
     problem = _problem(study, entry, entry.parameters)
