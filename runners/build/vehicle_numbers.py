@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 
 STEPS = ("mean flight", "mass properties", "aerodynamics", "slosh", "bending modes", "loads")
-STATIONS_ALONG = 41  # between the ends of the vehicle
+STATIONS_ALONG = 31  # between the ends of the vehicle
 
 
 @dataclass(frozen=True, eq=False)
