@@ -21,6 +21,7 @@ from ..model.vehicle import Vehicle, load_vehicle
 from ..model.wind_filter import ShapingFilter
 from ..model.wind_statistics import WindModel
 from .mean_response import with_mean_tables
+from .planar_mean import with_nonlinear_mean
 from .stability import Root, check_coupling, matrices_at, roots
 from .sweep_engine import sweep_of, with_sweep_mean_tables
 from .wind_range import warn_beyond
@@ -140,8 +141,12 @@ class StudyNumbers:
     def with_means(self) -> ExecutableSystem:
         """The system with its tables of the mean response, which the noise coefficients need, filled in."""
         if self.executable.shared_library is None:
-            return with_mean_tables(self.executable)
-        return with_sweep_mean_tables(sweep_of(self.system), self.executable)
+            filled = with_mean_tables(self.executable)
+        else:
+            filled = with_sweep_mean_tables(sweep_of(self.system), self.executable)
+        if self.vehicle is not None and self.vehicle.file.options.mean_response == "nonlinear":
+            return with_nonlinear_mean(self.vehicle, filled)
+        return filled
 
     def matrices(self, time: float) -> tuple[NDArray, NDArray, NDArray, NDArray]:
         """Return A (n, n), B (n, n_w), C (n_y, n), D (n_y, n_w) at a time; names are in ``study.system``."""
@@ -158,6 +163,10 @@ class StudyNumbers:
         """Return every table value at a time (s) by name."""
         self._check_times([time])
         return table_values(self.with_means.groups, float(time))
+
+    def _require_linear_mean(self, what: str) -> None:
+        if self.vehicle is not None and self.vehicle.file.options.mean_response == "nonlinear":
+            raise ParameterValueError(f'{what} follows the linear mean response; set options.mean_response = "linear"')
 
     def _check_spacing(self, spacing: float) -> None:
         if not spacing > 0:
