@@ -59,12 +59,15 @@ class FreeBeam:
         Rotations by displacements (1/m).
     rotary : (n, n) array
         Mass matrix of the sections' rotary inertia, by displacements (kg).
+    gimbal_station : float
+        m.
     """
 
     x: NDArray[np.float64]
     stiffness: NDArray[np.float64]
     turn: NDArray[np.float64]
     rotary: NDArray[np.float64]
+    gimbal_station: float
 
     @classmethod
     def of(cls, construction: Construction, edges: ArrayLike) -> FreeBeam:
@@ -75,7 +78,7 @@ class FreeBeam:
         turn = -cho_solve(cho_factor(rr), wr.T)
         condensed = ww + wr @ turn
         rotary = turn.T @ _line_matrix(rotary_line(construction, x)) @ turn
-        return cls(x, 0.5 * (condensed + condensed.T), turn, 0.5 * (rotary + rotary.T))
+        return cls(x, 0.5 * (condensed + condensed.T), turn, 0.5 * (rotary + rotary.T), construction.gimbal_station)
 
     def product(
         self, element_masses: NDArray[np.float64], first: NDArray[np.float64], second: NDArray[np.float64]
@@ -91,6 +94,10 @@ class FreeBeam:
             raise ModeError(
                 f"{element_masses.size} beam elements have {self.x.size - 2} modes, not {count}; ask for fewer"
             )
+        empty = np.flatnonzero((element_masses[:-1] <= 0) & (element_masses[1:] <= 0))
+        if empty.size:
+            begin, end = self.x[empty[0]] + self.gimbal_station, self.x[empty[0] + 2] + self.gimbal_station
+            raise ModeError(f"no mass lies between {begin:g} and {end:g} m; spread one over these stations")
         squared, shapes = eigh(
             self.stiffness, _line_matrix(element_masses) + self.rotary, subset_by_index=(2, count + 1)
         )
