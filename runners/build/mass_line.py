@@ -40,8 +40,8 @@ def beam_edges(construction: Construction, longest: float | None = None) -> NDAr
     return np.concatenate([*parts, [forward]]) - construction.gimbal_station
 
 
-def mass_line(construction: Construction, edges: ArrayLike, liquid: Mapping[str, float]) -> NDArray[np.float64]:
-    """Return the mass in each element (n,) in kg; the elements together hold the whole vehicle.
+def mass_line(construction: Construction, edges: ArrayLike, liquid: Mapping[str, ArrayLike]) -> NDArray[np.float64]:
+    """Return the mass in each element (..., n) in kg; the elements together hold the whole vehicle.
 
     Parameters
     ----------
@@ -49,7 +49,8 @@ def mass_line(construction: Construction, edges: ArrayLike, liquid: Mapping[str,
     edges : (n + 1,) array
         Metres forward of the gimbal plane, from the aft to the forward end of the vehicle.
     liquid : mapping
-        Tank name to the liquid in it (kg); a tank that is left out holds what it holds at release.
+        Tank name to the liquid in it (kg), each a number or of shape (...); a tank that is left out holds what it
+        holds at release.
 
     Raises
     ------
@@ -65,8 +66,8 @@ def mass_line(construction: Construction, edges: ArrayLike, liquid: Mapping[str,
         below += item.mass * _share_below(item, station)
     for tank in construction.tanks:
         shape = TankShape.of(tank)
-        level = shape.level(liquid.get(tank.name, tank.liquid) / tank.density)
-        below += tank.density * shape.volume(np.minimum(station, level))
+        level = shape.level(np.asarray(liquid.get(tank.name, tank.liquid), dtype=float) / tank.density)
+        below = below + tank.density * shape.volume(np.minimum(station, level[..., None]))
     return np.diff(below)
 
 
