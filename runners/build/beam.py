@@ -12,6 +12,7 @@ from scipy.linalg import cho_factor, cho_solve, eigh
 from ...model.construction import Construction
 from ...model.construction.structure import Stiffness
 from ...model.errors import ModeError
+from .mass_line import rotary_line
 
 _SMALLEST_END_DISPLACEMENT = 1e-3  # of the largest in a mode
 
@@ -25,9 +26,10 @@ class BeamModes:
     frequency : (k,) array
         rad/s, increasing.
     generalized_mass : (k,) array
-        Integral of mass times displacement squared (kg).
+        Integral of mass times displacement squared, plus rotary inertia times rotation squared (kg).
     x : (n,) array
-        Nodes, metres forward of the gimbal plane; between them displacement is linear in the integrals over mass.
+        Nodes, metres forward of the gimbal plane; between them displacement and rotation are linear where they are
+        integrated over mass.
     displacement : (k, n) array
         1.
     rotation : (k, n) array
@@ -43,7 +45,7 @@ class BeamModes:
 
 @dataclass(frozen=True, eq=False)
 class FreeBeam:
-    """Stiffness of a free beam for displacements; rotations follow them statically.
+    """Stiffness of a free beam for displacements and its rotary inertia; rotations follow displacements statically.
 
     Stiffness is exact for static loads at the nodes, with bending and shear stiffness varying inside the elements.
 
@@ -55,11 +57,17 @@ class FreeBeam:
         N/m.
     turn : (n, n) array
         Rotations by displacements (1/m).
+    rotary : (n, n) array
+        Mass matrix of the sections' rotary inertia, by displacements (kg).
+    gimbal_station : float
+        m.
     """
 
     x: NDArray[np.float64]
     stiffness: NDArray[np.float64]
     turn: NDArray[np.float64]
+    rotary: NDArray[np.float64]
+    gimbal_station: float
 
     @classmethod
     def of(cls, construction: Construction, edges: ArrayLike) -> FreeBeam:
@@ -69,7 +77,14 @@ class FreeBeam:
         ww, wr, rr = full[::2, ::2], full[::2, 1::2], full[1::2, 1::2]
         turn = -cho_solve(cho_factor(rr), wr.T)
         condensed = ww + wr @ turn
-        return cls(x, 0.5 * (condensed + condensed.T), turn)
+        rotary = turn.T @ _line_matrix(rotary_line(construction, x)) @ turn
+        return cls(x, 0.5 * (condensed + condensed.T), turn, 0.5 * (rotary + rotary.T), construction.gimbal_station)
+
+    def product(
+        self, element_masses: NDArray[np.float64], first: NDArray[np.float64], second: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Return the integrals of mass times displacements (j, n) and (k, n), rotations included: (j, k) in kg."""
+        return first @ (_line_matrix(element_masses) + self.rotary) @ second.T
 
     def eigenmodes(
         self, element_masses: NDArray[np.float64], count: int
@@ -79,7 +94,13 @@ class FreeBeam:
             raise ModeError(
                 f"{element_masses.size} beam elements have {self.x.size - 2} modes, not {count}; ask for fewer"
             )
-        squared, shapes = eigh(self.stiffness, _line_matrix(element_masses), subset_by_index=(2, count + 1))
+        empty = np.flatnonzero((element_masses[:-1] <= 0) & (element_masses[1:] <= 0))
+        if empty.size:
+            begin, end = self.x[empty[0]] + self.gimbal_station, self.x[empty[0] + 2] + self.gimbal_station
+            raise ModeError(f"no mass lies between {begin:g} and {end:g} m; spread one over these stations")
+        squared, shapes = eigh(
+            self.stiffness, _line_matrix(element_masses) + self.rotary, subset_by_index=(2, count + 1)
+        )
         return np.sqrt(squared), shapes.T
 
     def scaled(
@@ -103,8 +124,8 @@ def beam_modes(
 ) -> BeamModes:
     """Return the lowest bending modes of a vehicle.
 
-    Mass is uniform in an element and moves as the straight line between its nodes: the modes carry no momentum and no
-    angular momentum, so that sums over elements close. Sections have no rotary inertia.
+    Mass and rotary inertia are uniform in an element and move as the straight line between its nodes: modes carry no
+    momentum and no angular momentum, so that sums over elements close.
 
     Parameters
     ----------
@@ -127,15 +148,8 @@ def beam_modes(
     return beam.scaled(*beam.eigenmodes(np.asarray(element_masses, dtype=float), count), time)
 
 
-def mass_product(
-    element_masses: NDArray[np.float64], first: NDArray[np.float64], second: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Return the integrals of mass times displacements (j, n) and (k, n), of shape (j, k) (kg)."""
-    return first @ _line_matrix(element_masses) @ second.T
-
-
 def _line_matrix(masses: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the mass matrix of displacements that are linear between nodes."""
+    """Return the mass matrix of nodal values that are linear between nodes."""
     diagonal = (np.append(masses, 0.0) + np.insert(masses, 0, 0.0)) / 3
     return np.diag(diagonal) + np.diag(masses / 6, 1) + np.diag(masses / 6, -1)
 
