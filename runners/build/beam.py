@@ -99,7 +99,7 @@ class FreeBeam:
         loose = lower - (lower @ rigid) @ rigid.T
         last = self.x.size - 1
         inverse, vectors = eigh(loose.T @ self.flexibility @ loose, subset_by_index=(last + 1 - count, last))
-        shapes = solve_triangular(lower, vectors[:, ::-1], lower=True, trans="T")
+        shapes = solve_triangular(lower.T, vectors[:, ::-1])
         return inverse[::-1] ** -0.5, shapes.T
 
     def scaled(
