@@ -8,7 +8,7 @@ from itertools import pairwise
 import casadi as ca
 import numpy as np
 
-from . import bending, rigid_body, slosh
+from . import bending, load_relief, rigid_body, slosh
 from .control import TransferFunction, transfer_function, transfer_function_symbols
 from .coupling import accelerations
 from .errors import DataError
@@ -108,6 +108,7 @@ def assemble(vehicle: Vehicle, wind_start_covariance: np.ndarray) -> LinearSyste
     noises = {n: noise_process(n, e, parameters) for n, e in vehicle.noise.items()}
     sigma_scale = parameters.add("wind.sigma_scale", 1.0, "1", "factor on the wind's standard deviation")
     mean_scale = parameters.add("wind.mean_scale", 1.0, "1", "factor on the mean wind")
+    sensors = load_relief.sensor_symbols(vehicle.file.control.load_relief, modes, tables, parameters)
 
     lateral_velocity, attitude, attitude_rate = (
         ca.SX.sym(n) for n in ("lateral_velocity", "attitude", "attitude_rate")
@@ -122,11 +123,7 @@ def assemble(vehicle: Vehicle, wind_start_covariance: np.ndarray) -> LinearSyste
     measured_rate = attitude_rate + sensor_slopes.T @ eta_rate
     T1 = transfer_function("T1", *networks["T1"], measured)
     T2 = transfer_function("T2", *networks["T2"], measured_rate)
-    attitude_factor, rate_factor = tables["control.attitude_factor"], tables["control.rate_factor"]
-    T3 = transfer_function("T3", *networks["T3"], attitude_factor * T1.output + rate_factor * T2.output)
-
     alpha_of_state = rigid_body.angle_of_attack(tables, attitude, lateral_velocity, wind.wind + mean_wind)
-    beta_of_state = T3.output + bending.mode_column(tables, modes, "slope_at_gimbal").T @ eta
     alpha, beta = ca.SX.sym("alpha"), ca.SX.sym("beta")
     slopes = bending.slopes(tables, modes, tanks)
     moment = rigid_body.yaw_moment(tables, area, alpha, beta)
@@ -151,11 +148,26 @@ def assemble(vehicle: Vehicle, wind_start_covariance: np.ndarray) -> LinearSyste
         slosh_forcing=slosh.slosh_forcing(tables, tanks, slosh_damping, xi, xi_rate, attitude, eta, slopes),
         full=options.full_coupling,
     )
+    signals = {}
+    if "accelerometer" in sensors:
+        signals["accelerometer"] = load_relief.sensed_acceleration(
+            tables, sensors["accelerometer"], solved, attitude, eta
+        )
+    if "angle_of_attack" in sensors:
+        signals["angle_of_attack"] = load_relief.sensed_angle_of_attack(
+            tables, sensors["angle_of_attack"], alpha, attitude_rate, eta, eta_rate
+        )
+    relief = {name: sensors[name].feedback(name, signal) for name, signal in signals.items()}
+    attitude_factor, rate_factor = tables["control.attitude_factor"], tables["control.rate_factor"]
+    command = attitude_factor * T1.output + rate_factor * T2.output
+    T3 = transfer_function("T3", *networks["T3"], sum((F.output for F in relief.values()), command))
+    beta_of_state = T3.output + bending.mode_column(tables, modes, "slope_at_gimbal").T @ eta
     blocks = [
         (lateral_velocity, solved.lateral, [State("lateral_velocity", "m/s", SCALES["lateral_velocity"])]),
         (attitude, attitude_rate, [State("attitude", "rad", SCALES["angle"])]),
         (attitude_rate, solved.rotation, [State("attitude_rate", "rad/s", SCALES["angle"])]),
         *((T.states, T.derivative, _filter_states(name, T)) for name, T in (("T1", T1), ("T2", T2), ("T3", T3))),
+        *((F.states, F.derivative, load_relief.filter_states(name, F)) for name, F in relief.items()),
         (eta, eta_rate, _numbered("bending", modes, "m", SCALES["bending"])),
         (eta_rate, solved.bending, _numbered("bending_rate", modes, "m/s", SCALES["bending_rate"])),
         (xi, xi_rate, [State(f"slosh_{t}", "m", SCALES["slosh"]) for t in tanks]),
@@ -305,7 +317,11 @@ def _start_covariance(
 
 def _structure(vehicle: Vehicle, states: Sequence[State], groups: Sequence[TableGroup]) -> dict[str, str]:
     orders = (f"{n} {len(e.denominator) - 1}" for n, e in vehicle.transfer_functions.items())
+    relief = ", ".join(
+        f"{n} of order {len(e.filter.denominator) - 1}" for n, e in vehicle.file.control.load_relief.items()
+    )
     return {
+        **({"load relief": relief} if relief else {}),
         "bending modes": str(len(vehicle.bending)),
         "slosh tanks": ", ".join(t.name for t in vehicle.slosh) or "none",
         "transfer function orders": ", ".join(orders),

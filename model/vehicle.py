@@ -11,6 +11,7 @@ import numpy as np
 
 from .csv_table import CsvTable, read_csv_table
 from .errors import DataError, suggestion
+from .load_relief import SCHEDULE_COLUMNS, mode_columns
 from .loads import REACTION_COLUMNS, load_columns
 from .local_aerodynamics import PREFIX, local_columns, local_load_columns
 from .tables import Table
@@ -136,6 +137,7 @@ def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehi
     ):
         reader.add(name, getattr(file.tables, name), columns)
     reader.add("control.gains", file.control.gains, GAINS, "control.")
+    _add_load_relief(reader, file)
     tanks = [tank.name for tank in file.slosh]
     if len(set(tanks)) < len(tanks):
         raise DataError("two slosh tanks have the same name; rename one", file=toml, column="slosh")
@@ -167,7 +169,7 @@ def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehi
                     f"there is no table '{table}'{suggestion(table, reader.tables)}", file=toml, column=f"noise.{name}"
                 )
     wind = _load_wind(folder, file.wind, reader)
-    timed = [s for s in reader.sources if s.name not in ("wind", "wind.filter", "control.gains")]
+    timed = [s for s in reader.sources if not s.name.startswith(("wind", "control."))]
     first, last = max(timed, key=lambda s: s.first), min(timed, key=lambda s: s.last)
     start = file.start_time_s
     if start < first.first:
@@ -195,6 +197,21 @@ def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehi
         discontinuities=tuple(sorted(t for t in reader.discontinuities if start < t < last.last)),
         sources=tuple(reader.sources),
     )
+
+
+def _add_load_relief(reader: _Reader, file: VehicleFile) -> None:
+    """Read gain schedules and bending modes of the load-relief sensors."""
+    for sensor, entry in file.control.load_relief.items():
+        prefix = f"control.{sensor}."
+        if entry.schedule:
+            reader.add(f"{prefix}schedule", entry.schedule, SCHEDULE_COLUMNS, prefix)
+        if entry.modes:
+            reader.add(f"load_relief.{sensor}", entry.modes, mode_columns(len(file.bending)), prefix)
+        elif file.bending:
+            columns = ", ".join(f"{name} [{unit}]" for name, unit, _ in mode_columns(len(file.bending)))
+            raise DataError(
+                f"is missing; name a table of {columns} at the sensor", file=reader.toml, column=f"{prefix}modes"
+            )
 
 
 def _add_local(reader: _Reader, file: VehicleFile) -> None:

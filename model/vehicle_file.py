@@ -1,4 +1,4 @@
-"""What a vehicle's TOML file may hold (pydantic), and errors that name the key and the nearest valid one."""
+"""What a vehicle's TOML file may hold (pydantic)."""
 
 from __future__ import annotations
 
@@ -39,11 +39,44 @@ class TransferFunctionEntry(Section):
         return self
 
 
+class SensorFeedbackEntry(Section):
+    """Feedback of a load-relief sensor into the engine command.
+
+    ``modes`` holds displacement and slope of the bending modes at the sensor, ``schedule`` factors on the gain.
+    """
+
+    position_m: float
+    gain: float
+    filter: TransferFunctionEntry
+    modes: TableEntry | None = None
+    schedule: TableEntry | None = None
+    source: str = ""
+
+    @model_validator(mode="after")
+    def _strictly_proper(self):
+        if len(self.filter.numerator) >= len(self.filter.denominator):
+            raise ValueError(
+                "has a filter with as many zeros as poles: wind and engine angle would return to the engine command "
+                "without delay; add a pole, the sensor's bandwidth"
+            )
+        return self
+
+
 class ControlEntry(Section):
+    """Control law 4-4; ``accelerometer`` and ``angle_of_attack`` are load relief, absent in the report."""
+
     T1: TransferFunctionEntry
     T2: TransferFunctionEntry
     T3: TransferFunctionEntry
     gains: TableEntry
+    accelerometer: SensorFeedbackEntry | None = None
+    angle_of_attack: SensorFeedbackEntry | None = None
+
+    @property
+    def load_relief(self) -> dict[str, SensorFeedbackEntry]:
+        """Feedback of load-relief sensors by name; empty without any."""
+        entries = {"accelerometer": self.accelerometer, "angle_of_attack": self.angle_of_attack}
+        return {sensor: entry for sensor, entry in entries.items() if entry is not None}
 
 
 class BendingEntry(Section):
