@@ -38,7 +38,7 @@ DOCS = Path(__file__).parent.parent / "docs"
 def measure(study: Study, methods: list[Contender]) -> list[tuple[Contender, float, float, float]]:
     """Return (method, seconds for the job, error, MB above what stood before), all methods in turn."""
     reference = np.sqrt(covariance_equation(study.with_means, FULL.tolist(), 1e-13).variance)
-    some = reference[np.searchsorted(FULL, SOME)]
+    flight = FULL[-1] - study.system.start
     share = (FULL - study.system.start).sum() / (SOME - study.system.start).sum()
     seconds: dict[int, list[float]] = {k: [] for k in range(len(methods))}
     errors, memory = {}, {}
@@ -47,14 +47,18 @@ def measure(study: Study, methods: list[Contender]) -> list[tuple[Contender, flo
             if turn and min(seconds[k]) > SLOW:
                 continue
             times = SOME if method.each else FULL
+            scale = share if method.each else method.scale
+            if method.part is not None:
+                times, scale = study.system.start + np.array([method.part]), flight / method.part
             gc.collect()
             before = _peak_memory(reset=True)
             start = time.perf_counter()
             std = method.run(times)
-            seconds[k].append((time.perf_counter() - start) * (share if method.each else method.scale))
+            seconds[k].append((time.perf_counter() - start) * scale)
             if not turn:
                 memory[k] = _peak_memory() - before
-                errors[k] = float(np.abs(std / (some if method.each else reference) - 1).max())
+                expected = reference[np.searchsorted(FULL, times)]
+                errors[k] = float(np.abs(std / expected - 1).max())
         print(f"turn {turn + 1} of {ROUNDS} done", flush=True)
     return [(method, float(np.median(seconds[k])), errors[k], memory[k]) for k, method in enumerate(methods)]
 

@@ -113,7 +113,7 @@ class CompiledSweep:
     def mean_history(
         self, executable: ExecutableSystem, segments: Segments, tolerance: float
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], dict[str, int]]:
-        """Return states (k + 1, n) and outputs (k + 1, responses) of the mean at the start and the ends of the segments.
+        """Return states (k + 1, n) and outputs (k + 1, responses) of the mean at the start and all segment ends.
 
         The third is the counters.
 
