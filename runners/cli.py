@@ -14,8 +14,9 @@ from rich.table import Table
 
 from ..model.errors import AscentwindError, AscentwindWarning
 from .cli_checks import sensitivity, tolerance, verify
+from .cli_study import study
 from .cli_wind import app as wind_app
-from .terminal import VehicleArgument, console, errors, progress_bar
+from .terminal import VehicleArgument, console, errors, parse_changes, progress_bar
 
 app = typer.Typer(
     add_completion=False,
@@ -24,7 +25,7 @@ app = typer.Typer(
     help="Response statistics of ascending launch vehicles in a random wind, by the method of adjoint systems.",
 )
 app.add_typer(wind_app, name="wind")
-for command in (verify, tolerance, sensitivity):
+for command in (verify, tolerance, sensitivity, study):
     app.command()(command)
 
 
@@ -38,6 +39,10 @@ def run(
     ] = None,
     method: Annotated[str | None, typer.Option(help="CVODES formulas, adams or bdf; chooses cvodes.")] = None,
     tolerance: Annotated[float | None, typer.Option(help="Relative tolerance of the integration.")] = None,
+    changes: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="KEY=VALUE in the place of vehicle.toml's, e.g. options.full_coupling=true."),
+    ] = None,
 ) -> None:
     """Mean, variance and mean + 3 sigma of all responses over flight time: tables and figures."""
     from .engines import engine_options
@@ -50,7 +55,7 @@ def run(
     prepare_folder(folder)
     engine, options = engine_options(engine, method=method, relative_tolerance=tolerance)
     with console.status("loading and preparing code"):
-        study = Study.load(vehicle)
+        study = Study.load(vehicle, changes=parse_changes(changes or []))
     assert study.vehicle is not None
     end_times = parse_times(times or study.vehicle.file.default_times)
     families = [t for t in study.vehicle.file.weighting_times_s if study.system.start < t <= study.system.end]
@@ -95,7 +100,7 @@ def _print_peaks(statistics) -> None:
     for column in ("time", "mean + 3σ", "mean", "σ"):
         table.add_column(column, justify="right", no_wrap=True)
     for peak in found:
-        factor, unit = display(peak.unit)
+        factor, unit = display(peak.unit, peak.value)
         numbers = (f"{factor * x:.4g} {unit}" for x in (peak.value, peak.mean, peak.std))
         table.add_row(words(peak.response), f"{peak.time:g} s{'*' if peak.at_end else ''}", *numbers)
     console.print(table)
@@ -156,16 +161,20 @@ def inspect(
 
 @app.command()
 def regenerate(
-    vehicle: Annotated[str, typer.Argument(help="A shipped vehicle or a vehicle folder.")] = "as504",
-    out: Annotated[Path, typer.Option(help="Folder in which the vehicle gets a folder of its own.")] = Path(
+    vehicle: Annotated[
+        str | None, typer.Argument(help="A shipped vehicle or a vehicle folder; all shipped ones without it.")
+    ] = None,
+    out: Annotated[Path, typer.Option(help="Folder in which each vehicle gets a folder of its own.")] = Path(
         "generated"
     ),
 ) -> None:
     """Write the readable C of a vehicle and its manifest anew."""
+    from ..model.shipped import built_in_vehicles
     from .regenerate import regenerate as write
 
-    for path, state in write(vehicle, out).items():
-        console.print(f"{path}: {state}", soft_wrap=True)
+    for name in [vehicle] if vehicle else built_in_vehicles():
+        for path, state in write(name, out).items():
+            console.print(f"{path}: {state}", soft_wrap=True)
 
 
 @app.command()

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,7 +44,7 @@ class StudyNumbers:
     vehicle: Vehicle | None = None
 
     @classmethod
-    def load(cls, vehicle: str | Path, *, compile: bool = True) -> Self:
+    def load(cls, vehicle: str | Path, *, compile: bool = True, changes: Mapping[str, Any] | None = None) -> Self:
         """Load a shipped vehicle by name, or a vehicle folder.
 
         Parameters
@@ -52,12 +52,15 @@ class StudyNumbers:
         vehicle : str or path
         compile : bool
             False uses CasADi's interpreter: the same numbers, slower.
+        changes : mapping, optional
+            Values in the place of those in vehicle.toml, by dotted key: ``{"options.full_coupling": True}``. They may
+            change the structure, which ``with_parameters`` cannot.
 
         Raises
         ------
         UnknownNameError, DataError, SingularCouplingError, CompilerError
         """
-        return cls.from_vehicle(load_vehicle(find_vehicle(vehicle)), compile=compile)
+        return cls.from_vehicle(load_vehicle(find_vehicle(vehicle), changes), compile=compile)
 
     @classmethod
     def from_vehicle(cls, vehicle: Vehicle, *, compile: bool = True) -> Self:
