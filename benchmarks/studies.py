@@ -94,7 +94,7 @@ def speeds(members: int, workers: list[int], folder: Path) -> list[str]:
         with LocalCluster(
             n_workers=count, threads_per_worker=1, processes=True, dashboard_address=":0", memory_limit=0
         ) as cluster:
-            timed(plan_of(40 * count), study, folder / "warm", cluster.scheduler_address)  # every worker loads
+            timed(plan_of(20 * count), study, folder / "warm", cluster.scheduler_address)  # every worker loads
             pids = [nanny.pid for nanny in cluster.workers.values()]
             found = timed(plan, study, folder / "there", cluster.scheduler_address, pids)
         if (folder / "there" / "study.nc").read_bytes() != expected:
@@ -136,8 +136,8 @@ def kills(count: int, folder: Path) -> str:
     if not before.items() <= stored(out).items() or (out / "study.nc").read_bytes() != expected:
         sys.exit("the resumed study differs")
     return (
-        f"`ascentwind study` with 400 members, killed (SIGKILL) {hit} times at random moments: `study.nc` ends with the "
-        f"bytes of an uninterrupted run; none of the {len(before)} chunks stored at the last kill was written again."
+        f"`ascentwind study` with 400 members, killed (SIGKILL) {hit} times at random moments: `study.nc` ends with "
+        f"the bytes of an uninterrupted run; none of the {len(before)} chunks stored at the last kill was written again."
     )
 
 
@@ -157,10 +157,10 @@ def main() -> None:
         sentence = kills(given.kills, Path(name))
     table = "\n".join(
         [
-            f"{given.members} members of `examples/as504_dispersion.toml`, 51 end times, {available_cores()} cores, load "
-            f"average {os.getloadavg()[1]:.1f} in the five minutes before the end:",
+            f"{given.members} members of `examples/as504_dispersion.toml`, 51 end times, {available_cores()} cores, "
+            f"load average {os.getloadavg()[1]:.1f} in the five minutes before the end:",
             "",
-            "| where | wall time | processor time of the members | of all processes | overhead, wall | overhead, processor |",
+            "| where | wall time | processor time, members | all processes | overhead, wall | overhead, processor |",
             "|---|---|---|---|---|---|",
             *rows,
             "",
