@@ -1,35 +1,40 @@
-"""TOML files against their pydantic model, with errors that name the file, the key and the nearest valid one."""
+"""Reading a TOML file into a checked pydantic model, with errors that name the key and the nearest valid one."""
 
 from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from .errors import DataError, suggestion
 
-Model = TypeVar("Model", bound=BaseModel)
+Positive = Annotated[float, Field(gt=0)]
+NotNegative = Annotated[float, Field(ge=0)]
+Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
 
 
 class Section(BaseModel):
-    """A table of a TOML file: keys that it does not name are refused."""
+    """A table of a TOML file: unknown keys are refused."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
-def read_toml(file: Path, model: type[Model], changes: Mapping[str, Any] | None = None) -> Model:
+File = TypeVar("File", bound=Section)
+
+
+def read_toml(file: Path, model: type[File], changes: Mapping[str, Any] | None = None) -> File:
     """Read and check a TOML file.
 
     Parameters
     ----------
     file : Path
-    model : subclass of BaseModel
+    model : type
+        Its pydantic model.
     changes : mapping, optional
-        Values to put in the place of the file's, by dotted key: ``{"options.full_coupling": True}``. Items of a list
-        count from 0 (``bending.0.damping``).
+        Values to put in the place of the file's, by dotted key; items of a list count from 0.
 
     Raises
     ------
@@ -47,7 +52,7 @@ def read_toml(file: Path, model: type[Model], changes: Mapping[str, Any] | None 
     return validated(data, model, file)
 
 
-def validated(data: Mapping[str, Any], model: type[Model], file: Path | None = None) -> Model:
+def validated(data: Mapping[str, Any], model: type[File], file: Path | None = None) -> File:
     """Check the contents of a TOML file.
 
     Raises
@@ -60,7 +65,7 @@ def validated(data: Mapping[str, Any], model: type[Model], file: Path | None = N
         first = error.errors()[0]
         location = [str(part) for part in first["loc"]]
         if first["type"] == "extra_forbidden":
-            why = f"is not a key here{suggestion(location[-1], _keys(model, location[:-1]))}"
+            why = f"is not a key here{suggestion(location[-1], _keys_at(model, location[:-1]))}"
         elif first["type"] == "missing":
             why = "is missing; add it"
         else:
@@ -95,7 +100,7 @@ def _item(items: list[Any], index: str, dotted: str, file: Path) -> Any:
     return items[int(index)]
 
 
-def _keys(model: type[BaseModel], path: list[str]) -> list[str]:
+def _keys_at(model: type[BaseModel], path: list[str]) -> list[str]:
     """Return the keys allowed at a path of the file, following nested models."""
     for part in path:
         if part.isdigit() or part not in model.model_fields:

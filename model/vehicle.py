@@ -11,6 +11,8 @@ import numpy as np
 
 from .csv_table import CsvTable, read_csv_table
 from .errors import DataError, suggestion
+from .load_relief import SCHEDULE_COLUMNS, mode_columns
+from .loads import REACTION_COLUMNS, load_columns
 from .local_aerodynamics import PREFIX, local_columns, local_load_columns
 from .tables import Table
 from .vehicle_file import (
@@ -135,6 +137,7 @@ def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehi
     ):
         reader.add(name, getattr(file.tables, name), columns)
     reader.add("control.gains", file.control.gains, GAINS, "control.")
+    _add_load_relief(reader, file)
     tanks = [tank.name for tank in file.slosh]
     if len(set(tanks)) < len(tanks):
         raise DataError("two slosh tanks have the same name; rename one", file=toml, column="slosh")
@@ -146,8 +149,17 @@ def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehi
     if len(set(outputs)) < len(outputs):
         raise DataError("two loads have the same output name; rename one", file=toml, column="loads")
     for load in file.loads:
-        columns = _load_columns(len(file.bending), tanks)
-        reader.add(f"loads.{load.output}", load.table, columns, f"loads.{load.output}.")
+        columns = load_columns(len(file.bending), tanks)
+        if file.options.slosh_reaction:
+            if load.forward_of_gimbal_m is None:
+                raise DataError(
+                    "is missing, but options.slosh_reaction needs it; give metres forward of the gimbal plane",
+                    file=toml,
+                    column=f"loads.{load.output}.forward_of_gimbal_m",
+                )
+            columns += REACTION_COLUMNS
+        unused = () if file.options.slosh_reaction else REACTION_COLUMNS
+        reader.add(f"loads.{load.output}", load.table, columns, f"loads.{load.output}.", unused)
     if file.options.local_angle_of_attack:
         _add_local(reader, file)
     for name, noise in file.noise.items():
@@ -157,7 +169,7 @@ def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehi
                     f"there is no table '{table}'{suggestion(table, reader.tables)}", file=toml, column=f"noise.{name}"
                 )
     wind = _load_wind(folder, file.wind, reader)
-    timed = [s for s in reader.sources if s.name not in ("wind", "wind.filter", "control.gains")]
+    timed = [s for s in reader.sources if not s.name.startswith(("wind", "control."))]
     first, last = max(timed, key=lambda s: s.first), min(timed, key=lambda s: s.last)
     start = file.start_time_s
     if start < first.first:
@@ -187,6 +199,21 @@ def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehi
     )
 
 
+def _add_load_relief(reader: _Reader, file: VehicleFile) -> None:
+    """Read gain schedules and bending modes of the load-relief sensors."""
+    for sensor, entry in file.control.load_relief.items():
+        prefix = f"control.{sensor}."
+        if entry.schedule:
+            reader.add(f"{prefix}schedule", entry.schedule, SCHEDULE_COLUMNS, prefix)
+        if entry.modes:
+            reader.add(f"load_relief.{sensor}", entry.modes, mode_columns(len(file.bending)), prefix)
+        elif file.bending:
+            columns = ", ".join(f"{name} [{unit}]" for name, unit, _ in mode_columns(len(file.bending)))
+            raise DataError(
+                f"is missing; name a table of {columns} at the sensor", file=reader.toml, column=f"{prefix}modes"
+            )
+
+
 def _add_local(reader: _Reader, file: VehicleFile) -> None:
     """Read the integrals that the option local_angle_of_attack needs."""
     modes, missing = (
@@ -212,14 +239,14 @@ class _Reader:
         self.sources: list[TableSource] = []
         self.discontinuities: set[float] = set()
 
-    def read(self, name: str, entry: TableEntry, columns, argument: str, unit: str) -> CsvTable:
+    def read(self, name: str, entry: TableEntry, columns, argument: str, unit: str, unused=()) -> CsvTable:
         csv = read_csv_table(self.folder / entry.file, argument, unit)
         x = csv.columns[argument]
         for column, column_unit, sign in columns:
             csv.column(column, column_unit)
             if sign:
                 csv.require_positive(column, allow_zero=sign == "0")
-        unknown = set(csv.columns) - {c for c, _, _ in columns} - {argument}
+        unknown = set(csv.columns) - {c for c, _, _ in (*columns, *unused)} - {argument}
         if unknown:
             name = sorted(unknown)[0]
             raise DataError(
@@ -230,8 +257,8 @@ class _Reader:
         self.sources.append(TableSource(name, csv.file, entry.status, entry.source, float(x[0]), float(x[-1])))
         return csv
 
-    def add(self, name: str, entry: TableEntry, columns, prefix: str = "") -> None:
-        csv = self.read(name, entry, columns, "time", "s")
+    def add(self, name: str, entry: TableEntry, columns, prefix: str = "", unused=()) -> None:
+        csv = self.read(name, entry, columns, "time", "s", unused)
         for event in entry.events:
             if event not in self.events:
                 raise DataError(
@@ -284,15 +311,6 @@ def _bending_columns(tanks: list[str]):
         ("normal_force_slope_times_displacement", "1/rad", ""),
         *((f"displacement_at_{tank}", "1", "") for tank in tanks),
         *((f"slope_at_{tank}", "1/m", "") for tank in tanks),
-    )
-
-
-def _load_columns(modes: int, tanks: list[str]):
-    return (
-        ("angle_of_attack", "N m/rad", ""),
-        ("engine_angle", "N m/rad", ""),
-        *((f"bending_{i}", "N s2", "") for i in range(1, modes + 1)),
-        *((f"slosh_{tank}", "N s2", "") for tank in tanks),
     )
 
 

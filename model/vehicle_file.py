@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
 from pydantic import Field, model_validator
 
-from .toml_file import Section, read_toml
+from .toml_file import Name, NotNegative, Positive, Section, read_toml
 
-Positive = Annotated[float, Field(gt=0)]
-NotNegative = Annotated[float, Field(ge=0)]
-Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
-ExtraOutput = Literal["lateral_drift", "drift_rate", "dynamic_pressure_times_angle_of_attack"]
+ExtraOutput = Literal["lateral_drift", "drift_rate", "dynamic_pressure_times_angle_of_attack", "load_components"]
 
 
 class TableEntry(Section):
@@ -42,11 +39,44 @@ class TransferFunctionEntry(Section):
         return self
 
 
+class SensorFeedbackEntry(Section):
+    """Feedback of a load-relief sensor into the engine command.
+
+    ``modes`` holds displacement and slope of the bending modes at the sensor, ``schedule`` factors on the gain.
+    """
+
+    position_m: float
+    gain: float
+    filter: TransferFunctionEntry
+    modes: TableEntry | None = None
+    schedule: TableEntry | None = None
+    source: str = ""
+
+    @model_validator(mode="after")
+    def _strictly_proper(self):
+        if len(self.filter.numerator) >= len(self.filter.denominator):
+            raise ValueError(
+                "has a filter with as many zeros as poles: wind and engine angle would return to the engine command "
+                "without delay; add a pole, the sensor's bandwidth"
+            )
+        return self
+
+
 class ControlEntry(Section):
+    """Control law 4-4; ``accelerometer`` and ``angle_of_attack`` are load relief, absent in the report."""
+
     T1: TransferFunctionEntry
     T2: TransferFunctionEntry
     T3: TransferFunctionEntry
     gains: TableEntry
+    accelerometer: SensorFeedbackEntry | None = None
+    angle_of_attack: SensorFeedbackEntry | None = None
+
+    @property
+    def load_relief(self) -> dict[str, SensorFeedbackEntry]:
+        """Feedback of load-relief sensors by name; empty without any."""
+        entries = {"accelerometer": self.accelerometer, "angle_of_attack": self.angle_of_attack}
+        return {sensor: entry for sensor, entry in entries.items() if entry is not None}
 
 
 class BendingEntry(Section):
@@ -61,8 +91,11 @@ class SloshEntry(Section):
 
 
 class LoadEntry(Section):
+    """A bending moment. ``forward_of_gimbal_m`` is ``station_m`` from the gimbal plane; slosh_reaction needs it."""
+
     output: Name
     station_m: float
+    forward_of_gimbal_m: float | None = None
     table: TableEntry
     local: TableEntry | None = None
 
@@ -146,6 +179,7 @@ class WindEntry(Section):
 class OptionsEntry(Section):
     full_coupling: bool = False
     local_angle_of_attack: bool = False
+    slosh_reaction: bool = False
     extra_outputs: tuple[ExtraOutput, ...] = ()
 
 
@@ -155,6 +189,7 @@ class TablesEntry(Section):
     propulsion: TableEntry
     aerodynamics: TableEntry
     local_aerodynamics: TableEntry | None = None
+    loads_along_vehicle: TableEntry | None = None
 
 
 class VehicleFile(Section):

@@ -100,7 +100,7 @@ def _print_peaks(statistics) -> None:
     for column in ("time", "mean + 3σ", "mean", "σ"):
         table.add_column(column, justify="right", no_wrap=True)
     for peak in found:
-        factor, unit = display(peak.unit)
+        factor, unit = display(peak.unit, peak.value)
         numbers = (f"{factor * x:.4g} {unit}" for x in (peak.value, peak.mean, peak.std))
         table.add_row(words(peak.response), f"{peak.time:g} s{'*' if peak.at_end else ''}", *numbers)
     console.print(table)
@@ -161,16 +161,20 @@ def inspect(
 
 @app.command()
 def regenerate(
-    vehicle: Annotated[str, typer.Argument(help="A shipped vehicle or a vehicle folder.")] = "as504",
-    out: Annotated[Path, typer.Option(help="Folder in which the vehicle gets a folder of its own.")] = Path(
+    vehicle: Annotated[
+        str | None, typer.Argument(help="A shipped vehicle or a vehicle folder; all shipped ones without it.")
+    ] = None,
+    out: Annotated[Path, typer.Option(help="Folder in which each vehicle gets a folder of its own.")] = Path(
         "generated"
     ),
 ) -> None:
     """Write the readable C of a vehicle and its manifest anew."""
+    from ..model.shipped import built_in_vehicles
     from .regenerate import regenerate as write
 
-    for path, state in write(vehicle, out).items():
-        console.print(f"{path}: {state}", soft_wrap=True)
+    for name in [vehicle] if vehicle else built_in_vehicles():
+        for path, state in write(name, out).items():
+            console.print(f"{path}: {state}", soft_wrap=True)
 
 
 @app.command()

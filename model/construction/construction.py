@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 from ..errors import DataError, UnknownNameError
 from .flight import AtmosphereFactors, Drag, EngineGroup, NormalForceComponent, PitchProgramme, Site
 from .structure import LumpedMass, Stiffness, Tank
+from .tank_shape import TankShape
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +41,9 @@ class Construction:
         Stations whose bending moment is an output (m).
     end_time : float
         Latest end of the tables (s); the flight may end before at depletion.
+    slosh_method : {'surface_radius', 'cylinder', 'potential'}
+        Cylinder formulas with the radius of the free surface at the liquid's level, or with the tank's largest radius;
+        or the first mode of potential flow in the tank's own shape.
     """
 
     name: str
@@ -59,17 +64,26 @@ class Construction:
     atmosphere: AtmosphereFactors | None
     load_stations: tuple[float, ...]
     end_time: float
+    slosh_method: Literal["surface_radius", "cylinder", "potential"] = "surface_radius"
 
     def __post_init__(self):
         for mass in self.masses:
-            if mass.begin < self.aft_end or mass.end > self.forward_end:
-                raise DataError(
-                    f"mass '{mass.name}' lies from {mass.begin:g} to {mass.end:g} m, beyond the vehicle's ends at "
-                    f"{self.aft_end:g} and {self.forward_end:g} m; correct its stations"
-                )
+            mass.require_within(self.aft_end, self.forward_end)
         for tank in self.tanks:
             if tank.bottom < self.aft_end or tank.top > self.forward_end:
                 raise DataError(f"tank '{tank.name}' lies beyond the vehicle's ends; correct its sections")
+            capacity = TankShape.of(tank).capacity
+            if tank.liquid > tank.density * capacity:
+                raise DataError(
+                    f"tank '{tank.name}' is overfilled: {tank.liquid:g} kg at {tank.density:g} kg/m3 take "
+                    f"{tank.liquid / tank.density:.4g} m3 of {capacity:.4g} m3; correct liquid, density or sections"
+                )
+        ends = self.stiffness.station[[0, -1]]
+        if ends[0] > self.aft_end or ends[1] < self.forward_end:
+            raise DataError(
+                f"stiffness is given from {ends[0]:g} to {ends[1]:g} m, the vehicle reaches from {self.aft_end:g} to "
+                f"{self.forward_end:g} m; add stations"
+            )
         names = [tank.name for tank in self.tanks]
         for group in self.engines:
             for tank in (*group.draws, *group.residual):

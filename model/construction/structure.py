@@ -44,6 +44,14 @@ class LumpedMass:
         if not self.radius >= 0:
             raise DataError(f"mass '{self.name}' has the radius {self.radius:g} m; give 0 or more")
 
+    def require_within(self, aft_end: float, forward_end: float) -> None:
+        """Refuse a mass that reaches beyond the vehicle's ends."""
+        if self.begin < aft_end or self.end > forward_end:
+            raise DataError(
+                f"mass '{self.name}' lies from {self.begin:g} to {self.end:g} m, beyond the vehicle's ends at "
+                f"{aft_end:g} and {forward_end:g} m; correct its stations"
+            )
+
 
 @dataclass(frozen=True)
 class TankSection:
@@ -81,6 +89,14 @@ class TankSection:
             raise DataError(f"a tank section ends at {self.end:g} m, not forward of its begin at {self.begin:g} m")
         if not self.radius > 0 or not self.end_radius >= 0 or not self.semi_axis > 0 or self.count < 1:
             raise DataError(f"the tank section from {self.begin:g} m needs positive radius, semi-axis and count")
+        if self.kind == "ellipsoid":
+            slack = 1e-6 * self.semi_axis
+            low, high = self.center - self.semi_axis - slack, self.center + self.semi_axis + slack
+            if self.begin < low or self.end > high:
+                raise DataError(
+                    f"the ellipsoid section from {self.begin:g} to {self.end:g} m reaches beyond its tips at "
+                    f"{low + slack:g} and {high - slack:g} m; correct begin, end, center or semi_axis"
+                )
 
 
 @dataclass(frozen=True)
