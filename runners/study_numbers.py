@@ -138,15 +138,18 @@ class StudyNumbers:
         return study.with_parameters(values)
 
     @cached_property
-    def with_means(self) -> ExecutableSystem:
-        """The system with its tables of the mean response, which the noise coefficients need, filled in."""
+    def linear_means(self) -> ExecutableSystem:
+        """The system with its tables of the mean response filled in by the linear mean."""
         if self.executable.shared_library is None:
-            filled = with_mean_tables(self.executable)
-        else:
-            filled = with_sweep_mean_tables(sweep_of(self.system), self.executable)
+            return with_mean_tables(self.executable)
+        return with_sweep_mean_tables(sweep_of(self.system), self.executable)
+
+    @cached_property
+    def with_means(self) -> ExecutableSystem:
+        """The system with the tables of the mean response that the noise coefficients need, as the options ask."""
         if self.vehicle is not None and self.vehicle.file.options.mean_response == "nonlinear":
-            return with_nonlinear_mean(self.vehicle, filled)
-        return filled
+            return with_nonlinear_mean(self.vehicle, self.linear_means)
+        return self.linear_means
 
     def matrices(self, time: float) -> tuple[NDArray, NDArray, NDArray, NDArray]:
         """Return A (n, n), B (n, n_w), C (n_y, n), D (n_y, n_w) at a time; names are in ``study.system``."""
