@@ -100,17 +100,17 @@ def load_coefficients(vehicle: LoadedVehicle, stations: NDArray[np.float64]) -> 
     """
     line, mu, r = vehicle.line, vehicle.mass, vehicle.rotary_inertia
     x = line.points
-    mass = line.total(mu)
-    center = line.total(x * mu) / mass
-    inertia = line.total((x - center) ** 2 * mu + r)
+    mass = float(line.total(mu))
+    center = float(line.total(x * mu)) / mass
+    inertia = float(line.total((x - center) ** 2 * mu + r))
 
-    def moment_about_station(force, couple=0.0):
+    def moment_about_station(force: NDArray, couple: NDArray | float = 0.0) -> NDArray:
         return line.forward(x * force + couple, stations) - stations * line.forward(force, stations)
 
     first = moment_about_station(mu)
     second = moment_about_station((x - center) * mu, r)
 
-    def free(density):
+    def free(density: NDArray) -> NDArray:
         lateral, turning = line.total(density)[..., None], line.total((x - center) * density)[..., None]
         return moment_about_station(density) - first * lateral / mass - second * turning / inertia
 
