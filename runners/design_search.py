@@ -17,7 +17,7 @@ from scipy.optimize import lsq_linear, minimize
 
 from .design_peaks import SIGNS, Row, gradients, three_sigma
 from .design_problem import LoadReliefProblem
-from .frozen_roots import FrozenDamping, FrozenRoots
+from .frozen_roots import FrozenDamping, FrozenRoots, root_families
 
 log = logging.getLogger(__name__)
 
@@ -72,6 +72,7 @@ class Search:
     def __init__(self, problem: LoadReliefProblem):
         self.problem = problem
         self.responses = [problem.response, *problem.peak_limits]
+        self.families = root_families(problem.study.system)
         executable = problem.study.executable
         self.roots = FrozenRoots(executable, problem.frozen_times, problem.names) if problem.frozen_times else None
         self.evaluations = self.derivatives = 0
@@ -111,7 +112,7 @@ class Search:
         parts = [(1 - point.peaks[1:] / allowed[:, None, None]).ravel()]
         if point.frozen is not None:
             for family, least in problem.damping_limits.items():
-                found = point.frozen.damping[:, self.roots.families.index(family)]
+                found = point.frozen.damping[:, self.families.index(family)]
                 parts.append((found - least) / max(abs(least), LEAST_DAMPING_SCALE))
             parts.append((problem.largest_growth - point.frozen.growth) / GROWTH_SCALE)
         return np.concatenate(parts)
@@ -135,7 +136,7 @@ class Search:
         parts = [-self._peak_gradients(u, i) / limit for i, limit in enumerate(problem.peak_limits.values(), start=1)]
         if point.frozen is not None:
             for family, least in problem.damping_limits.items():
-                slope = point.frozen.damping_gradient[:, self.roots.families.index(family)]
+                slope = point.frozen.damping_gradient[:, self.families.index(family)]
                 parts.append(slope * problem.span / max(abs(least), LEAST_DAMPING_SCALE))
             parts.append(-point.frozen.growth_gradient * problem.span / GROWTH_SCALE)
         return np.concatenate([np.zeros((0, n)), *parts])
