@@ -1,12 +1,15 @@
 """A system's matrices, and gradients of two forms of it, at many points in time at once.
 
-One reverse evaluation gives the derivatives with respect to every parameter and every table value, however many
+One reverse evaluation gives the derivatives with respect to every number and every table value, however many
 there are. Two forms suffice for every first derivative of a variance or a mean:
 
     quadratic   2 a' A y + sum_j m_j (B' a)_j^2 + 2 c' C y
     linear      a' (A x + E u) + c' (C x + G u)
 
-with u the known inputs, themselves functions of parameters and table values.
+with u the known inputs, themselves functions of parameters and table values. What depends on parameters alone is
+computed once for all points: the functions see *numbers* z(p), the parameters that stand in the equations beside
+tables or time and every larger expression of parameters alone, so that a point's cost follows the equations and not
+the count of parameters.
 """
 
 from __future__ import annotations
@@ -14,158 +17,224 @@ from __future__ import annotations
 import ctypes
 import logging
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from pathlib import Path
 
 import casadi as ca
-import jinja2
 import numpy as np
 from numpy.typing import NDArray
 
 from ..model.system import LinearSystem
 from .cache import CacheError, compiled_library, set_aside
 from .compiler import find_compiler
-from .expressions import c_function, enumerators
 from .fingerprint import fingerprint
+from .node_source import SOURCE_FILES, nodes_source
+from .sweep import optimizing
 
 log = logging.getLogger(__name__)
 
 AGREEMENT = 1e-12  # between compiled and interpreted functions, of the largest entry
 MATRICES = ("A", "B", "C", "E", "G", "inputs")
-ARGUMENTS = {
-    "node_matrices": ("t", "v", "p"),
-    "quadratic_gradient": ("t", "v", "p", "a", "y", "c", "m"),
-    "linear_gradient": ("t", "v", "p", "a", "x", "c"),
-}
-_ENVIRONMENT = jinja2.Environment(
-    loader=jinja2.PackageLoader("ascentwind.codegen"), undefined=jinja2.StrictUndefined, keep_trailing_newline=True
-)
 _POINTER = ctypes.POINTER(ctypes.c_double)
 
 
-def derive_functions(system: LinearSystem) -> tuple[ca.Function, ca.Function, ca.Function]:
-    """Derive the nonzeros of the matrices, and the gradients of both forms, (n_p + n_v,), parameters first."""
+@dataclass(frozen=True, eq=False)
+class NodeExpressions:
+    """The functions of a system that are evaluated at points, and what they have from its parameters.
+
+    Attributes
+    ----------
+    numbers : Function
+        p -> z.
+    numbers_reverse : Function
+        (p, seed of z) -> gradient with respect to p.
+    matrices : Function
+        (t, v, z) -> nonzeros of A, B, C, E, G and the known inputs.
+    quadratic : Function
+        (t, v, z, a, y, c, m) -> gradient of the quadratic form with respect to z and v.
+    linear : Function
+        (t, v, z, a, x, c) -> gradient of the linear form.
+    patterns : tuple of Sparsity
+        Of A, B, C, E, G and the known inputs.
+    """
+
+    numbers: ca.Function
+    numbers_reverse: ca.Function
+    matrices: ca.Function
+    quadratic: ca.Function
+    linear: ca.Function
+    patterns: tuple[ca.Sparsity, ...]
+
+    @property
+    def at_points(self) -> tuple[ca.Function, ca.Function, ca.Function]:
+        return self.matrices, self.quadratic, self.linear
+
+
+@lru_cache(maxsize=8)
+def node_expressions(system: LinearSystem) -> NodeExpressions:
+    """Derive the functions of a system."""
     n, r = len(system.states), len(system.outputs)
     a, y, c, m = (ca.SX.sym(s, k) for s, k in (("a", n), ("y", n), ("c", r), ("m", len(system.noises))))
+    derivative, output, inputs, numbers, symbols = _with_numbers(system)
     signals = ca.vertcat(system.x, system.w, system.u)
     silent = ca.SX.zeros(system.w.numel())
 
-    def at(expression: ca.SX, state: ca.SX, inputs: ca.SX) -> ca.SX:
-        return ca.substitute(expression, signals, ca.vertcat(state, silent, inputs))
+    def at(expression: ca.SX, state: ca.SX, known: ca.SX) -> ca.SX:
+        return ca.substitute(expression, signals, ca.vertcat(state, silent, known))
 
     still = ca.SX.zeros(system.u.numel())
-    white = ca.jtimes(system.derivative, system.w, a, True) if system.w.numel() else ca.SX(0, 1)
-    quadratic = (
-        2 * ca.dot(a, at(system.derivative, y, still))
-        + ca.dot(m, white**2)
-        + 2 * ca.dot(c, at(system.output, y, still))
-    )
-    linear = ca.dot(a, at(system.derivative, y, system.input_values)) + ca.dot(
-        c, at(system.output, y, system.input_values)
-    )
-    numbers = ca.vertcat(system.p, system.v)
-    first = [system.time, system.v, system.p, a, y, c]
-    nonzeros = ca.vertcat(*(ca.vec(matrix.nz[:]) for matrix in matrices(system)))
-    return (
-        ca.Function("node_matrices", first[:3], [ca.densify(nonzeros)]),
-        ca.Function("quadratic_gradient", [*first, m], [ca.densify(ca.gradient(quadratic, numbers))]),
-        ca.Function("linear_gradient", first, [ca.densify(ca.gradient(linear, numbers))]),
+    white = ca.jtimes(derivative, system.w, a, True) if system.w.numel() else ca.SX(0, 1)
+    quadratic = 2 * ca.dot(a, at(derivative, y, still)) + ca.dot(m, white**2) + 2 * ca.dot(c, at(output, y, still))
+    linear = ca.dot(a, at(derivative, y, inputs)) + ca.dot(c, at(output, y, inputs))
+    blocks = [(derivative, system.x), (derivative, system.w), (output, system.x)]
+    blocks += [(derivative, system.u), (output, system.u)]
+    found = [*(ca.jacobian(*block) for block in blocks), ca.sparsify(inputs)]
+    first, seed = [system.time, system.v, symbols], ca.SX.sym("seed", symbols.numel())
+    to = ca.vertcat(symbols, system.v)
+    nonzeros = ca.vertcat(ca.SX(0, 1), *(ca.vec(matrix.nz[:]) for matrix in found))
+    return NodeExpressions(
+        ca.Function("numbers", [system.p], [ca.densify(numbers)]),
+        ca.Function("numbers_reverse", [system.p, seed], [ca.densify(ca.jtimes(numbers, system.p, seed, True))]),
+        ca.Function("node_matrices", first, [ca.cse(ca.densify(nonzeros))]),
+        ca.Function("quadratic_gradient", [*first, a, y, c, m], [ca.cse(ca.densify(ca.gradient(quadratic, to)))]),
+        ca.Function("linear_gradient", [*first, a, y, c], [ca.cse(ca.densify(ca.gradient(linear, to)))]),
+        tuple(matrix.sparsity() for matrix in found),
     )
 
 
-def matrices(system: LinearSystem) -> tuple[ca.SX, ...]:
-    """Return A, B, C, E, G and the known inputs, sparse."""
-    return system.A, system.B, system.C, system.E, system.G, ca.sparsify(system.input_values)
-
-
-def nodes_source(system: LinearSystem, functions: tuple[ca.Function, ...]) -> str:
-    """Return C that evaluates the functions at many points."""
-    names = {
-        "v": enumerators("V", [name for g in system.tables for name in g.names]),
-        "p": enumerators("P", system.parameter_names),
-    }
-    loops = [
-        {
-            "name": f.name(),
-            "arguments": list(zip(ARGUMENTS[f.name()], (f.numel_in(i) for i in range(f.n_in())), strict=True)),
-            "size": f.numel_out(0),
-            "core": c_function(f"{f.name()}_core", f, ARGUMENTS[f.name()], ("result",), names),
-        }
-        for f in functions
-    ]
-    return _ENVIRONMENT.get_template("node_functions.c.jinja").render(
-        title=f"{system.name}: matrices, and gradients with respect to parameters and table values",
-        table_names=names["v"],
-        parameter_names=names["p"],
-        loops=loops,
+def _with_numbers(system: LinearSystem) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX, ca.SX]:
+    """Return x', y and the known inputs in terms of numbers, these as expressions of p, and their symbols."""
+    given = [system.derivative, system.output, system.input_values]
+    expressions, symbols, hoisted = ca.extract_parametric(given, system.p)
+    free = {symbol.__hash__() for symbol in ca.symvar(ca.veccat(*expressions))}
+    bare = [system.p[i] for i in range(system.p.numel()) if system.p[i].__hash__() in free]
+    renamed = [ca.SX.sym(p.name()) for p in bare]
+    derivative, output, inputs = ca.substitute(
+        [ca.SX(e) for e in expressions], [ca.vertcat(ca.SX(0, 1), *bare)], [ca.vertcat(ca.SX(0, 1), *renamed)]
     )
+    numbers = ca.vertcat(ca.SX(0, 1), *bare, *hoisted)
+    return derivative, output, inputs, numbers, ca.vertcat(ca.SX(0, 1), *renamed, *symbols)
+
+
+@dataclass(frozen=True, eq=False)
+class NodeMatrix:
+    """A sparse matrix at many points.
+
+    Attributes
+    ----------
+    pattern : Sparsity
+    values : (k, nonzeros) array
+        In the order of the pattern, column by column.
+    """
+
+    pattern: ca.Sparsity
+    values: NDArray[np.float64]
+
+    @cached_property
+    def dense(self) -> NDArray[np.float64]:
+        """All of it, (k, rows, columns)."""
+        found = np.zeros((self.values.shape[0], *self.pattern.shape))
+        found[:, self.pattern.row(), self.pattern.get_col()] = self.values
+        return found
+
+    def times(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the products with vectors (k, columns), shape (k, rows)."""
+        return self._product(x, self.pattern.size1(), self.pattern.row(), self.pattern.get_col())
+
+    def transposed_times(self, a: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the products of the transpose with vectors (k, rows), shape (k, columns)."""
+        return self._product(a, self.pattern.size2(), self.pattern.get_col(), self.pattern.row())
+
+    def _product(self, x: NDArray, size: int, to: list[int], of: list[int]) -> NDArray[np.float64]:
+        found = np.zeros((size, x.shape[0]))
+        for k, (i, j) in enumerate(zip(to, of, strict=True)):
+            found[i] += self.values[:, k] * x[:, j]
+        return np.ascontiguousarray(found.T)
+
+    def first(self, count: int) -> NodeMatrix:
+        """Return the matrix at the first ``count`` points."""
+        return NodeMatrix(self.pattern, self.values[:count])
 
 
 @dataclass(frozen=True, eq=False)
 class NodeFunctions:
-    """The functions of a system at many points, compiled where a compiler is found, else interpreted.
+    """The functions of a system at many points, compiled where a compiler is found, else interpreted."""
 
-    Attributes
-    ----------
-    functions : CasADi functions
-        Nonzeros of the matrices, gradient of the quadratic and of the linear form.
-    patterns : tuple of Sparsity
-        Of A, B, C, E, G and the known inputs.
-    shared_library : Path or None
-    """
-
-    functions: tuple[ca.Function, ca.Function, ca.Function]
-    patterns: tuple[ca.Sparsity, ...]
+    expressions: NodeExpressions
     shared_library: Path | None
 
-    def matrices(self, t: NDArray, v: NDArray, p: NDArray) -> dict[str, NDArray[np.float64]]:
-        """Return A, B, C, E, G and the known inputs at k points, each (k, rows, columns).
+    def numbers(self, p: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the numbers z of parameters p."""
+        return np.array(self.expressions.numbers(p), float).ravel()
+
+    def by_parameters(self, p: NDArray[np.float64], by_numbers: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return a gradient with respect to the parameters from one with respect to the numbers."""
+        return np.array(self.expressions.numbers_reverse(p, by_numbers), float).ravel()
+
+    def matrices(self, t: NDArray, v: NDArray, z: NDArray) -> dict[str, NodeMatrix]:
+        """Return A, B, C, E, G and the known inputs at k points.
 
         Parameters
         ----------
         t : (k,) array
         v : (k, n_v) array
-        p : (n_p,) array
+        z : (n_z,) array
         """
-        values, first, found = self._evaluate(0, (t, v, p)), 0, {}
-        for name, pattern in zip(MATRICES, self.patterns, strict=True):
-            dense = np.zeros((t.size, *pattern.shape))
-            dense[:, pattern.row(), pattern.get_col()] = values[:, first : first + pattern.nnz()]
-            found[name], first = dense, first + pattern.nnz()
+        values, first, found = self._evaluate(0, (t, v, z))[1], 0, {}
+        for name, pattern in zip(MATRICES, self.expressions.patterns, strict=True):
+            found[name] = NodeMatrix(pattern, np.ascontiguousarray(values[:, first : first + pattern.nnz()]))
+            first += pattern.nnz()
         return found
 
-    def quadratic_gradient(self, *arguments: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the gradient of the quadratic form at k points, (k, n_p + n_v).
+    def quadratic_gradient(
+        self, weights: NDArray[np.float64], *arguments: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the gradient of the quadratic form at k points.
 
         Parameters
         ----------
+        weights : (k,) array
         arguments : arrays
-            t (k,), v (k, n_v), p (n_p,), a (k, n), y (k, n), c (k, n_y), m (n_w,). One-dimensional ones but t are the
+            t (k,), v (k, n_v), z (n_z,), a (k, n), y (k, n), c (k, n_y), m (n_w,). One-dimensional ones but t are the
             same at every point.
+
+        Returns
+        -------
+        by_numbers : (n_z,) array
+            Weighted sum over the points.
+        by_tables : (k, n_v) array
+            Point by point.
         """
-        return self._evaluate(1, arguments)
+        return self._evaluate(1, arguments, weights)
 
-    def linear_gradient(self, *arguments: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the gradient of the linear form at k points; arguments t, v, p, a, x, c as above."""
-        return self._evaluate(2, arguments)
+    def linear_gradient(
+        self, weights: NDArray[np.float64], *arguments: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the gradient of the linear form at k points; arguments t, v, z, a, x, c and results as above."""
+        return self._evaluate(2, arguments, weights)
 
-    def _evaluate(self, which: int, arguments: tuple[NDArray[np.float64], ...]) -> NDArray[np.float64]:
-        function, count = self.functions[which], arguments[0].size
+    def _evaluate(
+        self, which: int, arguments: tuple[NDArray[np.float64], ...], weights: NDArray[np.float64] | None = None
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        function, count = self.expressions.at_points[which], arguments[0].size
+        summed = 0 if weights is None else self.expressions.numbers.numel_out(0)
         arrays = [np.ascontiguousarray(x, float) for x in arguments]
+        weights = np.zeros(count) if weights is None else np.ascontiguousarray(weights, float)
         if self.shared_library is None:
             columns = [
                 x[None, :] if i == 0 else np.tile(x[:, None], count) if x.ndim == 1 else x.T
                 for i, x in enumerate(arrays)
             ]
-            return function.map(count)(*columns).full().T
-        found = np.empty((count, function.numel_out(0)))
+            result = function.map(count)(*columns).full()
+            return result[:summed] @ weights, result[summed:].T
+        total, kept = np.zeros(summed), np.empty((count, function.numel_out(0) - summed))
         call = getattr(ctypes.CDLL(str(self.shared_library)), function.name())
         call.restype = None
         pointers = [x.ctypes.data_as(_POINTER) for x in arrays]
         strides = [1, *(0 if x.ndim == 1 else x.shape[1] for x in arrays[1:])]
         given = [part for pair in zip(pointers, map(ctypes.c_long, strides), strict=True) for part in pair]
-        call(ctypes.c_long(count), *given, found.ctypes.data_as(_POINTER))
-        return found
+        call(ctypes.c_long(count), *given, *(x.ctypes.data_as(_POINTER) for x in (weights, total, kept)))
+        return total, kept
 
 
 @lru_cache(maxsize=4)
@@ -177,19 +246,17 @@ def node_functions(system: LinearSystem, compile: bool = True) -> NodeFunctions:
     CompilerError
         If a compiler was found and failed.
     """
-    functions = derive_functions(system)
-    patterns = tuple(matrix.sparsity() for matrix in matrices(system))
+    expressions = node_expressions(system)
     compiler = find_compiler() if compile else None
-    interpreted = NodeFunctions(functions, patterns, None)
+    interpreted = NodeFunctions(expressions, None)
     if compiler is None:
         return interpreted
-    files = ("node_functions.py", "expressions.py", "templates/node_functions.c.jinja", "templates/collocation.c")
     try:
         library = compiled_library(
             f"{system.name}-nodes",
-            fingerprint(system, functions, files),
-            lambda: nodes_source(system, functions),
-            compiler,
+            fingerprint(system, expressions.at_points, SOURCE_FILES),
+            lambda: nodes_source(system, expressions.at_points),
+            optimizing(compiler),
             dict(system.structure),
         )
     except CacheError as error:
@@ -204,13 +271,15 @@ def node_functions(system: LinearSystem, compile: bool = True) -> NodeFunctions:
 
 
 def _difference(one: NodeFunctions, other: NodeFunctions) -> float:
-    """Return the largest difference at two random points, relative to the largest entry of its result."""
-    random = np.random.default_rng(504)
+    """Return the largest difference at a few random points, relative to the largest entry of its result."""
+    random, points = np.random.default_rng(504), 11
     largest = 0.0
-    for which, function in enumerate(one.functions):
+    for which, function in enumerate(one.expressions.at_points):
         sizes = [function.numel_in(i) for i in range(function.n_in())]
-        arguments = [random.uniform(0.5, 1.5, size if i == 2 else (2, size)) for i, size in enumerate(sizes)]
-        found, expected = (f._evaluate(which, (arguments[0][:, 0], *arguments[1:])) for f in (one, other))
-        if expected.size:
-            largest = max(largest, float(np.abs(found - expected).max() / max(1e-300, np.abs(expected).max())))
+        arguments = [random.uniform(0.5, 1.5, size if i == 2 else (points, size)) for i, size in enumerate(sizes)]
+        weights = random.uniform(0.5, 1.5, points) if which else None
+        results = (f._evaluate(which, (arguments[0][:, 0], *arguments[1:]), weights) for f in (one, other))
+        for found, expected in zip(*results, strict=True):
+            if expected.size:
+                largest = max(largest, float(np.abs(found - expected).max() / max(1e-300, np.abs(expected).max())))
     return largest

@@ -199,13 +199,13 @@ def compiled_sweep(system: LinearSystem) -> CompiledSweep:
         f"{system.name}-sweep",
         sweep_fingerprint(system, functions),
         lambda: sweep_source(system, functions),
-        _optimizing(compiler),
+        optimizing(compiler),
         dict(system.structure),
     )
     return CompiledSweep(system, functions, library)
 
 
-def _optimizing(compiler: Compiler) -> Compiler:
+def optimizing(compiler: Compiler) -> Compiler:
     """Return the compiler with the options that a loop over columns needs: fused products and the widest registers."""
     flags = (*compiler.flags, "-O3", "-ffp-contract=fast", "-fno-math-errno", "-mprefer-vector-width=512")
     return replace(compiler, flags=known_flags(compiler.command, flags))

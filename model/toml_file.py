@@ -49,6 +49,16 @@ def read_toml(file: Path, model: type[File], changes: Mapping[str, Any] | None =
         raise DataError(f"is not valid TOML: {error}", file=file) from None
     for dotted, value in (changes or {}).items():
         _put(data, dotted, value, file)
+    return validated(data, model, file)
+
+
+def validated(data: Mapping[str, Any], model: type[File], file: Path | None = None) -> File:
+    """Check the contents of a TOML file.
+
+    Raises
+    ------
+    DataError
+    """
     try:
         return model.model_validate(data)
     except ValidationError as error:
@@ -62,7 +72,7 @@ def read_toml(file: Path, model: type[File], changes: Mapping[str, Any] | None =
             why = str(first["msg"]).removeprefix("Value error, ")
             if not isinstance(first["input"], dict | list):
                 why += f" (found {first['input']!r})"
-        raise DataError(why, file=file, column=".".join(location)) from None
+        raise DataError(why, file=file, column=".".join(location) or None) from None
 
 
 def _put(data: dict[str, Any], dotted: str, value: Any, file: Path) -> None:

@@ -1,4 +1,4 @@
-"""What a vehicle's TOML file may hold (pydantic), and errors that name the key and the nearest valid one."""
+"""What a vehicle's TOML file may hold (pydantic)."""
 
 from __future__ import annotations
 

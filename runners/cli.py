@@ -15,6 +15,7 @@ from rich.table import Table
 from ..model.errors import AscentwindError, AscentwindWarning
 from .cli_checks import sensitivity, tolerance, verify
 from .cli_design import design
+from .cli_study import study
 from .cli_wind import app as wind_app
 from .terminal import VehicleArgument, console, errors, parse_changes, progress_bar
 
@@ -25,7 +26,7 @@ app = typer.Typer(
     help="Response statistics of ascending launch vehicles in a random wind, by the method of adjoint systems.",
 )
 app.add_typer(wind_app, name="wind")
-for command in (verify, tolerance, sensitivity, design):
+for command in (verify, tolerance, sensitivity, study, design):
     app.command()(command)
 
 

@@ -16,6 +16,7 @@ from ..codegen.node_functions import node_functions
 from ..model.errors import AscentwindError, AscentwindWarning, TimeRangeError, UnknownNameError
 from ..model.system import LinearSystem
 from ..model.tables import TableGroup
+from .flight_nodes import FlightNodes
 from .sensitivity_gradient import AdjointPair, Gradient
 from .sensitivity_peak import peak_time
 from .stability import warn_if_unstable
@@ -90,7 +91,8 @@ class Request:
 
     def pair(self, study: Study, time: float) -> AdjointPair:
         functions = node_functions(study.system, study.executable.shared_library is not None)
-        return AdjointPair(study.with_means, functions, self.row, time, self.sources)
+        flight = FlightNodes.until(study.with_means, functions, [time])
+        return AdjointPair(flight, self.row, time, self.sources)
 
     def factors(self, pair: AdjointPair) -> tuple[float, float]:
         """Return dQ/dVar and dQ/dmean.
@@ -127,17 +129,16 @@ def sensitivity(
 ) -> xr.Dataset:
     """See :meth:`Study.sensitivity`."""
     request = Request.of(study, response, source, quantity)
-    rows = _parameter_rows(study.system, parameters)
+    rows = parameter_rows(study.system, parameters)
     at_peak = isinstance(time, str)
     if isinstance(time, str):
         if time != "peak":
             raise TimeRangeError(f"'{time}' is not a time; give seconds or 'peak'")
-        time, at_end = peak_time(study, request)
+        time, at_limit = peak_time(study, request)
     else:
-        time, at_end = float(time), False
+        time, at_limit = float(time), False
     study._check_times([time])
-    if time <= study.system.start:
-        raise TimeRangeError(f"at its start, {time:g} s, a system has no history to differentiate; choose a later time")
+    check_end_time(study, time)
     warn_if_unstable(study.executable, time)
     pair = request.pair(study, time)
     gradient = pair.gradient(*request.factors(pair))
@@ -149,8 +150,11 @@ def sensitivity(
         )
     dataset = _parameters_dataset(study, gradient, rows, value, elasticity)
     if any(g.name != "mean" for g in study.system.tables):
-        dataset = dataset.merge(_tables_dataset(study, pair, gradient, value, elasticity))
-        knots = knot_sensitivities(study, pair, gradient)
+        groups = study.with_means.groups
+        density = total_density(groups, pair.tables, gradient.tables)
+        at_end = total_density(groups, pair.tables_at_end[None], gradient.tables_at_end[None])[0]
+        dataset = dataset.merge(_tables_dataset(study, pair, gradient, density, at_end, value, elasticity))
+        knots = knot_sensitivities(study, pair, gradient, density, at_end)
         if knots is not None:
             if elasticity:
                 knots["knot_elasticity"] = knots["knot_derivative"] * knots["knot_value"] / value
@@ -166,14 +170,31 @@ def sensitivity(
         "variance": pair.variance,
         "mean": pair.mean,
         "at_peak": int(at_peak),
-        "peak_at_end_of_range": int(at_end),
-        "engine": "collocation, Gauss-Legendre of order 6",
-        "steps": pair.grid.steps.size,
+        "peak_at_end_of_range": int(at_limit),
+        "engine": "collocation, Gauss-Legendre of order 8",
+        "steps": pair.steps,
     }
     return dataset
 
 
-def _parameter_rows(system: LinearSystem, wanted: Iterable[str] | None) -> list[int]:
+def check_end_time(study: Study, time: float) -> None:
+    """Refuse the start of a system.
+
+    Raises
+    ------
+    TimeRangeError
+    """
+    if time <= study.system.start:
+        raise TimeRangeError(f"at its start, {time:g} s, a system has no history to differentiate; choose a later time")
+
+
+def parameter_rows(system: LinearSystem, wanted: Iterable[str] | None) -> list[int]:
+    """Return the numbers of parameters by name, all without names.
+
+    Raises
+    ------
+    UnknownNameError, StructuralParameterError
+    """
     names = system.parameter_names
     if wanted is None:
         return list(range(len(names)))
@@ -219,14 +240,20 @@ def _parameters_dataset(
     return dataset
 
 
-def _tables_dataset(study: Study, pair: AdjointPair, gradient: Gradient, value: float, elasticity: bool) -> xr.Dataset:
+def _tables_dataset(
+    study: Study,
+    pair: AdjointPair,
+    gradient: Gradient,
+    density: NDArray,
+    at_end: NDArray,
+    value: float,
+    elasticity: bool,
+) -> xr.Dataset:
     groups = study.with_means.groups
     names = [n for g in groups for n in g.names]
     units = [u for g in groups for u in g.units]
     columns = [names.index(n) for g in groups if g.name != "mean" for n in g.names]
     values, values_at_end = pair.tables, pair.tables_at_end
-    density = total_density(groups, values, gradient.tables)
-    at_end = total_density(groups, values_at_end[None], gradient.tables_at_end[None])[0]
     dataset = xr.Dataset(
         {
             "table_value": (("table", "t"), values[:, columns].T),

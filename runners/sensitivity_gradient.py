@@ -18,14 +18,12 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ..codegen.compiled import ExecutableSystem
-from ..codegen.node_functions import NodeFunctions
 from ..model.assemble import MEAN_TABLES
 from ..model.system import LinearSystem
-from .collocation import Grid, collocation, collocation_grid, longest_step, tables_at
+from .collocation_grid import STAGES, tables_at
+from .flight_nodes import FlightNodes
 from .integration import intervals
 
-FROZEN = 7  # times at which the roots of A are looked at
 SLOPE_STEP = 1e-3  # s, of central differences of the output matrices, which are cubic in time
 
 
@@ -70,60 +68,41 @@ class AdjointPair:
 
     Parameters
     ----------
-    executable : ExecutableSystem
-        With its tables of the mean response filled in.
-    functions : NodeFunctions
+    flight : FlightNodes
+        To ``time`` at least.
     response : int
         Row of C.
     time : float
-        t2, s; on a discontinuity it is seen from the left.
+        t2, s, an edge of the grid; on a discontinuity it is seen from the left.
     sources : tuple of str
-    step : float, optional
-        Longest step, s; from the roots of A without it.
     """
 
-    def __init__(
-        self,
-        executable: ExecutableSystem,
-        functions: NodeFunctions,
-        response: int,
-        time: float,
-        sources: tuple[str, ...],
-        step: float | None = None,
-    ):
-        system = executable.system
-        self.executable, self.functions = executable, functions
+    def __init__(self, flight: FlightNodes, response: int, time: float, sources: tuple[str, ...]):
+        self.flight, self.executable = flight, flight.executable
+        system, executable = self.executable.system, self.executable
         self.response, self.time, self.sources = response, time, sources
-        if step is None:
-            spread = system.start + (time - system.start) * (np.arange(FROZEN) + 0.5) / FROZEN
-            frozen = functions.matrices(spread, tables_at(executable.groups, spread), executable.parameters)
-            step = longest_step(frozen["A"])
-        self.grid: Grid = collocation_grid(system, executable.groups, time, step)
+        n, steps = len(system.states), int(np.searchsorted(flight.grid.edges, time))
+        self.steps = steps
         self.mask = np.array([float(noise.source in sources) for noise in system.noises])
         last = intervals(system, system.start, time)[-1]
         self._low, self.end = last.low, last.high  # the end from the left, where it is a discontinuity
+        self.times, self.weights = flight.grid.nodes[:steps].ravel(), flight.grid.weights[:steps].ravel()
+        self.tables = flight.tables[: STAGES * steps]
         self.tables_at_end = tables_at(executable.groups, np.array([self.end]))[0]
+        self.matrices = {name: matrix.first(STAGES * steps) for name, matrix in flight.matrices.items()}
         self.at_end = executable.matrices(time, last.low, last.high)
-        times, shape = self.grid.nodes.ravel(), self.grid.nodes.shape
-        self.tables = tables_at(executable.groups, times)
-        flat = functions.matrices(times, self.tables, executable.parameters)
-        self.matrices = {name: value.reshape(*shape, *value.shape[1:]) for name, value in flat.items()}
-        self.solver = collocation(self.grid, self.matrices["A"], functions.shared_library)
 
-        self.adjoint, self.adjoint_at_start = self.solver.backward(
-            self.at_end["C"][response], np.zeros((*shape, len(system.states)))
-        )
+        still = np.zeros((steps, STAGES, n))
+        stages, edges = flight.solver.backward(self.at_end["C"][response], still)
+        self.adjoint, self.adjoint_at_start = stages.reshape(-1, n), edges[0]
         B = self.matrices["B"]
-        white = self.mask * np.einsum("kinw,kin->kiw", B, self.adjoint)
-        covariance = sum(
-            (system.start_covariance_matrix(s, executable.parameters) for s in sources),
-            np.zeros((len(system.states),) * 2),
-        )
+        white = self.mask * B.transposed_times(self.adjoint)
+        covariance = sum((system.start_covariance_matrix(s, executable.parameters) for s in sources), np.zeros((n, n)))
         start = covariance @ self.adjoint_at_start
-        self.dual, self.dual_at_end = self.solver.forward(start, np.einsum("kinw,kiw->kin", B, white))
-        self.variance = float(np.sum(self.grid.weights[..., None] * white**2) + self.adjoint_at_start @ start)
-        known = np.einsum("kinu,kiu->kin", self.matrices["E"], self.matrices["inputs"][..., 0])
-        self.states, self.states_at_end = self.solver.forward(np.zeros(len(system.states)), known)
+        stages, edges = flight.solver.forward(start, B.times(white).reshape(steps, STAGES, n))
+        self.dual, self.dual_at_end = stages.reshape(-1, n), edges[-1]
+        self.variance = float(self.weights @ np.sum(white**2, axis=1) + self.adjoint_at_start @ start)
+        self.states, self.states_at_end = flight.mean[0][:steps].reshape(-1, n), flight.mean[1][steps]
         self.mean = float(
             self.at_end["C"][response] @ self.states_at_end + self.at_end["G"][response] @ self.at_end["inputs"][:, 0]
         )
@@ -150,38 +129,43 @@ class AdjointPair:
 
     def gradient(self, variance_factor: float, mean_factor: float) -> Gradient:
         """Return the derivatives of ``variance_factor`` variance + ``mean_factor`` mean."""
-        system, p = self.executable.system, self.executable.parameters
-        n, r, n_p = len(system.states), len(system.outputs), system.p.numel()
-        times, weights = self.grid.nodes.ravel(), self.grid.weights.ravel()
-        v, functions = self.tables, self.functions
-        end, v_end = np.array([self.end]), self.tables_at_end[None]
-        none, selected = np.zeros(r), np.eye(r)[self.response]
-        total = np.zeros((times.size, n_p + v.shape[1]))
-        total_end = np.zeros(n_p + v.shape[1])
-        at_start = np.zeros(n_p)
+        system, p, functions = self.executable.system, self.executable.parameters, self.flight.functions
+        n, r = len(system.states), len(system.outputs)
+        at = (self.weights, self.times, self.tables, self.flight.numbers)
+        at_end = (np.ones(1), np.array([self.end]), self.tables_at_end[None], self.flight.numbers)
+        selected, still = np.eye(r)[self.response], np.zeros((1, n))
+        numbers, along = np.zeros(self.flight.numbers.size), np.zeros_like(self.tables)
+        last = np.zeros(system.v.numel())
+        at_start = np.zeros(p.size)
         adjoint = mean_factor * self.adjoint
-        on_outputs, on_outputs_end = np.zeros((times.size, r)), mean_factor * selected
+        on_outputs, on_outputs_end = np.zeros((self.times.size, r)), mean_factor * selected
+
+        def add(inside: tuple[NDArray, NDArray], end: tuple[NDArray, NDArray], factor: float) -> None:
+            numbers[:] += factor * (inside[0] + end[0])
+            along[:] += factor * inside[1]
+            last[:] += factor * end[1][0]
+
         if variance_factor:
-            rows, dual = self.adjoint.reshape(-1, n), self.dual.reshape(-1, n)
-            total += variance_factor * functions.quadratic_gradient(times, v, p, rows, dual, none, self.mask)
-            still = np.zeros((1, n))
-            total_end += (
-                variance_factor
-                * functions.quadratic_gradient(end, v_end, p, still, self.dual_at_end[None], selected, self.mask)[0]
+            add(
+                functions.quadratic_gradient(*at, self.adjoint, self.dual, np.zeros(r), self.mask),
+                functions.quadratic_gradient(*at_end, still, self.dual_at_end[None], selected, self.mask),
+                variance_factor,
             )
             at_start = variance_factor * self._start_gradient(system, p)
-            path = self._mean_path(total[:, n_p:], total_end[n_p:])
-            adjoint = adjoint + self.solver.backward(path.on_states_at_end, path.on_states)[0]
-            on_outputs, on_outputs_end = on_outputs + path.on_outputs, on_outputs_end + path.on_outputs_at_end
+            path = self._mean_path(along, last)
+            if path is not None:
+                stages, _ = self.flight.solver.backward(path.on_states_at_end, path.on_states.reshape(-1, STAGES, n))
+                adjoint = adjoint + stages.reshape(-1, n)
+                on_outputs, on_outputs_end = on_outputs + path.on_outputs, on_outputs_end + path.on_outputs_at_end
         if adjoint.any() or on_outputs_end.any():
-            states = self.states.reshape(-1, n)
-            total += functions.linear_gradient(times, v, p, adjoint.reshape(-1, n), states, on_outputs)
-            total_end += functions.linear_gradient(
-                end, v_end, p, np.zeros((1, n)), self.states_at_end[None], on_outputs_end[None]
-            )[0]
+            add(
+                functions.linear_gradient(*at, adjoint, self.states, on_outputs),
+                functions.linear_gradient(*at_end, still, self.states_at_end[None], on_outputs_end[None]),
+                1.0,
+            )
         value = variance_factor * self.variance + mean_factor * self.mean
-        parameters = weights @ total[:, :n_p] + total_end[:n_p] + at_start
-        return Gradient(value, parameters, times, weights, total[:, n_p:], total_end[n_p:])
+        parameters = functions.by_parameters(p, numbers) + at_start
+        return Gradient(value, parameters, self.times, self.weights, along, last)
 
     def _start_gradient(self, system: LinearSystem, p: NDArray) -> NDArray:
         a, found = ca.DM(self.adjoint_at_start), np.zeros(p.size)
@@ -192,23 +176,24 @@ class AdjointPair:
                 found += np.array(ca.Function("start", [system.p], [ca.densify(form)])(p)).ravel()
         return found
 
-    def _mean_path(self, on_tables: NDArray, on_tables_end: NDArray) -> _MeanPath:
+    def _mean_path(self, on_tables: NDArray, on_tables_end: NDArray) -> _MeanPath | None:
         """Move what the variance owes to the tables of the mean response on to the mean's states and outputs."""
         system = self.executable.system
         names = [name for g in self.executable.groups for name in g.names]
-        k, n, r = self.grid.steps.size, len(system.states), len(system.outputs)
-        path = _MeanPath(np.zeros((k, 3, n)), np.zeros((k * 3, r)), np.zeros(n), np.zeros(r))
-        for name in (name for name in MEAN_TABLES if name in names):
-            (kind, what), column = MEAN_TABLES[name], names.index(name)
-            along, last = on_tables[:, column], on_tables_end[column]
+        if not set(MEAN_TABLES) <= set(names):
+            return None
+        k, n, r = self.times.size, len(system.states), len(system.outputs)
+        path = _MeanPath(np.zeros((k, n)), np.zeros((k, r)), np.zeros(n), np.zeros(r))
+        for name, (kind, what) in MEAN_TABLES.items():
+            along, last = on_tables[:, names.index(name)], on_tables_end[names.index(name)]
             if kind == "output":
                 row = system.output_index(what)
                 path.on_outputs[:, row] += along
                 path.on_outputs_at_end[row] += last
-                path.on_states[:] += along.reshape(k, 3, 1) * self.matrices["C"][:, :, row]
-                path.on_states_at_end[:] += last * self.at_end["C"][row]
             else:
                 state = system.state_names.index(what)
-                path.on_states[:, :, state] += along.reshape(k, 3)
+                path.on_states[:, state] += along
                 path.on_states_at_end[state] += last
+        path.on_states[:] += self.matrices["C"].transposed_times(path.on_outputs)
+        path.on_states_at_end[:] += path.on_outputs_at_end @ self.at_end["C"]
         return path

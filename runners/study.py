@@ -14,6 +14,7 @@ from .engines import Progress, batch_dataset, compute_statistics
 from .integration import IntegratorOptions
 from .sensitivity import sensitivity
 from .sensitivity_check import check_sensitivity
+from .sensitivity_family import sensitivities
 from .stability import warn_if_unstable
 from .statistics import COMBINED, ResponseStatistics, weighting_dataset, weighting_family
 from .study_numbers import StudyNumbers
@@ -227,6 +228,37 @@ class Study(StudyNumbers):
             Parameters that are zero; their ``elasticity_defined`` is 0.
         """
         return sensitivity(self, response, time, source, quantity, parameters, elasticity)
+
+    def sensitivities(
+        self,
+        responses: Iterable[str] | None,
+        times: Iterable[float],
+        *,
+        source: str = COMBINED,
+        quantity: str = "std",
+        parameters: Iterable[str] | None = None,
+    ) -> xr.Dataset:
+        """Return exact derivatives of many responses at many end times; what they share is computed once.
+
+        Parameters
+        ----------
+        responses : iterable of str or None
+            All with None.
+        times : iterable of float
+            End times t2, s.
+        source, quantity, parameters
+            As for :meth:`sensitivity`.
+
+        Returns
+        -------
+        xarray.Dataset
+            ``value`` (time, response) and ``derivative`` (time, response, parameter).
+
+        Raises
+        ------
+        UnknownNameError, StructuralParameterError, TimeRangeError, DirectNoiseError, ZeroQuantityError
+        """
+        return sensitivities(self, responses, times, source, quantity, parameters)
 
     def check_sensitivity(
         self,

@@ -1,12 +1,15 @@
-"""From densities over time to the rows of a vehicle's tables: each row's basis function, integrated.
+"""From densities over time to the rows of a vehicle's tables.
 
-Cubic, linear and step tables are linear in their rows, so that the basis function of a row is the interpolation of a
-unit vector; monotone cubics (pchip) are not, and are differentiated by central differences of their interpolation.
+A table is a cubic in each interval between knots, so that all a row needs of a density are its moments in the
+intervals, the integrals of the density times 1, u, u^2, u^3 with u from the left knot. The cubics of a unit vector
+give the row's share. Monotone cubics (pchip) are not linear in their rows; theirs are central differences of the
+interpolation alone.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -14,8 +17,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
+from scipy.sparse import csr_array
 
-from ..model.tables import Table
+from ..model.tables import ORDER, Table, TableGroup
 from ..model.vehicle import Vehicle
 from .sensitivity_gradient import AdjointPair, Gradient
 
@@ -31,88 +35,135 @@ def vehicle_rows(vehicle: Vehicle) -> dict[str, Table]:
     return {t.name: t for t in (*vehicle.tables.values(), wind.mean, *wind.shaping_filter.tables())}
 
 
-def knot_sensitivities(study: Study, pair: AdjointPair, gradient: Gradient) -> xr.Dataset | None:
+def knot_sensitivities(
+    study: Study, pair: AdjointPair, gradient: Gradient, density: NDArray, at_end: NDArray
+) -> xr.Dataset | None:
     """Return the derivative with respect to every row of every table of a vehicle; None without a vehicle.
 
     A row of the altitude moves the rate of climb and, through the wind's tables, the wind that is met; the wind
     filter's covariance at the start is held.
-    """
-    from .sensitivity import total_density
 
+    Parameters
+    ----------
+    density : (k, n_v) array
+        Derivative with respect to the table values at the nodes, per second.
+    at_end : (n_v,) array
+        Weight of its delta at t2.
+    """
     if study.vehicle is None:
         return None
     groups = study.with_means.groups
-    group_of = {name: group for group in groups for name in group.names}
-    names = list(group_of)
-    density = total_density(groups, pair.tables, gradient.tables)
-    at_end = total_density(groups, pair.tables_at_end[None], gradient.tables_at_end[None])[0]
-    known: dict[tuple, NDArray] = {}
-    of, argument, values, derivative = [], [], [], []
-    for table in vehicle_rows(study.vehicle).values():
-        group, column = group_of[table.name], names.index(table.name)
+    names = [name for group in groups for name in group.names]
+    weighted = np.concatenate([gradient.weights[:, None] * density, at_end[None]])
+    moments: dict[str, NDArray] = {}
+    first = 0
+    for group in groups:
         if group.argument == "time":
             points = np.append(gradient.times, pair.end)
         else:
             at = names.index(group.argument)
             points = np.append(pair.tables[:, at], pair.tables_at_end[at])
-        points = np.clip(points, group.knots[0], group.knots[-1])
-        basis = _cached_basis(table, points, 0, known)
-        found = (gradient.weights * density[:, column]) @ basis[:-1] + at_end[column] * basis[-1]
-        if table.name == "altitude":
-            rate, slope = names.index("altitude_rate"), _cached_basis(table, points, 1, known)
-            found = found + (gradient.weights * density[:, rate]) @ slope[:-1] + at_end[rate] * slope[-1]
-        of += [table.name] * found.size
-        argument.append(table.argument)
-        values.append(table.values)
-        derivative.append(found)
+        found = interval_moments(group, points, weighted[:, first : first + len(group.names)])
+        moments |= dict(zip(group.names, np.moveaxis(found, 2, 0), strict=True))
+        first += len(group.names)
+    rate = moments.get("altitude_rate")
+    if rate is not None:  # the slope of the altitude: c1 + 2 c2 u + 3 c3 u^2
+        moments["altitude"] = moments["altitude"].copy()
+        moments["altitude"][:, 1:] += np.arange(1, ORDER) * rate[:, :-1]
+    knots_of = {name: group.knots for group in groups for name in group.names}
+    rows = vehicle_rows(study.vehicle)
+    alike: dict[tuple, list[str]] = {}
+    for name, table in rows.items():
+        alike.setdefault(_shape(table, knots_of[name]), []).append(name)
+    derivatives: dict[str, NDArray] = {}
+    for shape, of in alike.items():
+        flat = np.stack([moments[name].ravel() for name in of])
+        derivatives |= dict(zip(of, flat @ _row_cubics(*shape), strict=True))
     dataset = xr.Dataset(
         {
-            "knot_value": ("knot", np.concatenate(values)),
-            "knot_derivative": ("knot", np.concatenate(derivative)),
+            "knot_value": ("knot", np.concatenate([table.values for table in rows.values()])),
+            "knot_derivative": ("knot", np.concatenate([derivatives[name] for name in rows])),
         },
         {
-            "knot_table": ("knot", of),
-            "knot_argument": ("knot", np.concatenate(argument), {"long_name": "s, or m for the wind's tables"}),
+            "knot_table": ("knot", [name for name, table in rows.items() for _ in table.values]),
+            "knot_argument": (
+                "knot",
+                np.concatenate([table.argument for table in rows.values()]),
+                {"long_name": "s, or m for the wind's tables"},
+            ),
         },
     )
     dataset["knot_derivative"].attrs = {"long_name": "derivative with respect to one row, response unit per table unit"}
     return dataset
 
 
-def _cached_basis(table: Table, points: NDArray, order: int, known: dict[tuple, NDArray]) -> NDArray[np.float64]:
-    shape = (table.argument.tobytes(), table.interpolation, table.breaks, order, points.tobytes())
-    if table.interpolation == "pchip":
-        shape += (table.values.tobytes(),)
-    if shape not in known:
-        known[shape] = row_basis(table, points, order)
-    return known[shape]
+def interval_moments(group: TableGroup, points: NDArray, weighted: NDArray) -> NDArray[np.float64]:
+    """Return the sums of 1, u, u^2, u^3 times weights in every interval of a group.
+
+    Parameters
+    ----------
+    points : (k,) array
+        Arguments; beyond the first and last knot values are held.
+    weighted : (k, m) array
+        Weight of each table at each point.
+
+    Returns
+    -------
+    (intervals, 4, m) array
+    """
+    x = np.clip(points, group.knots[0], group.knots[-1])
+    interval = np.clip(np.searchsorted(group.knots, x, side="right") - 1, 0, group.knots.size - 2)
+    u = x - group.knots[interval]
+    where = np.arange(x.size)
+    shape = (group.knots.size - 1, x.size)
+    powers = (csr_array((u**power, (interval, where)), shape) @ weighted for power in range(ORDER))
+    return np.stack(list(powers), axis=1)
 
 
-def row_basis(table: Table, points: NDArray, order: int = 0) -> NDArray[np.float64]:
-    """Return the derivative of a table's value (or its slope, ``order`` 1) at points by its rows, (k, rows)."""
-    if table.interpolation != "cubic":
-        return _differences(table, points, order)
-    x, found = table.argument, np.zeros((points.size, table.argument.size))
-    edges = [x[0], *(b for b in sorted(set(table.breaks)) if x[0] < b < x[-1]), x[-1]]
-    for k, (low, high) in enumerate(pairwise(edges)):
-        inside = (x >= low) & (x <= high)
-        at = ((points >= low) | (k == 0)) & ((points < high) | (k == len(edges) - 2))
-        if inside.sum() > 2:
-            spline = CubicSpline(x[inside], np.eye(inside.sum()), bc_type="not-a-knot")
-            found[np.ix_(at, inside)] = spline(points[at], order)
-        else:
-            found[np.ix_(at, inside)] = _differences(
-                Table(table.name, table.unit, x[inside], table.values[inside], "linear"), points[at], order
-            )
-    return found
+def _shape(table: Table, knots: NDArray) -> tuple[bytes, bytes, str, tuple[float, ...], bytes]:
+    """Return all that the cubics of a table's rows depend on; the same for many tables."""
+    values = table.values.tobytes() if table.interpolation == "pchip" else b""
+    return table.argument.tobytes(), values, table.interpolation, table.breaks, knots.tobytes()
 
 
-def _differences(table: Table, points: NDArray, order: int) -> NDArray[np.float64]:
-    step = PCHIP_STEP * max(1e-300, float(np.abs(table.values).max()))
-    columns = []
-    for row in np.eye(table.argument.size):
-        up, down = (
-            replace(table, values=table.values + sign * step * row).polynomial(points, order) for sign in (1, -1)
-        )
-        columns.append((up - down) / (2 * step))
-    return np.stack(columns, axis=1)
+@lru_cache(maxsize=64)
+def _row_cubics(
+    argument: bytes, values: bytes, interpolation: str, breaks: tuple[float, ...], knots: bytes
+) -> NDArray[np.float64]:
+    """Return the cubics of every row in the k intervals between knots, (4 k, rows), lowest power first."""
+    x, ends = np.frombuffer(argument), np.frombuffer(knots)
+    found = np.zeros((ends.size - 1, ORDER, x.size))
+    middle = 0.5 * (ends[:-1] + ends[1:])
+    edges = [x[0], *(b for b in sorted(set(breaks)) if x[0] < b < x[-1]), x[-1]]
+    for low, high in [(x[0], x[-1])] if interpolation == "step" else pairwise(edges):
+        inside = np.flatnonzero((x >= low) & (x <= high))
+        at = np.flatnonzero((middle > low) & (middle < high))
+        cubics = _unit_cubics(x[inside], np.frombuffer(values)[inside] if values else None, interpolation)
+        piece = np.clip(np.searchsorted(x[inside], middle[at], side="right") - 1, 0, cubics.shape[1] - 1)
+        c3, c2, c1, c0 = cubics[:, piece]
+        u = (ends[at] - x[inside][piece])[:, None]
+        shifted = (c0 + u * (c1 + u * (c2 + u * c3)), c1 + u * (2 * c2 + 3 * c3 * u), c2 + 3 * c3 * u, c3)
+        for power, coefficient in enumerate(shifted):
+            found[at[:, None], power, inside] = coefficient
+    found[middle < x[0], 0, 0] = 1.0
+    found[middle > x[-1], 0, -1] = 1.0
+    return found.reshape(-1, x.size)
+
+
+def _unit_cubics(x: NDArray, values: NDArray | None, interpolation: str) -> NDArray[np.float64]:
+    """Return the cubics between the rows of one piece for each row, (4, rows - 1, rows), highest power first."""
+    unit = np.eye(x.size)
+    if interpolation == "step":
+        return np.concatenate([np.zeros((ORDER - 1, x.size - 1, x.size)), unit[None, :-1]])
+    if interpolation == "linear" or x.size == 2:
+        slope = np.diff(unit, axis=0) / np.diff(x)[:, None]
+        return np.concatenate([np.zeros((2, x.size - 1, x.size)), slope[None], unit[None, :-1]])
+    if values is None:
+        return CubicSpline(x, unit, bc_type="not-a-knot").c
+    table = Table("row", "1", x, values, interpolation)
+    step = PCHIP_STEP * max(1e-300, float(np.abs(values).max()))
+    sides = [
+        np.stack([replace(table, values=values + sign * step * row).polynomial.c for row in unit], axis=-1)
+        for sign in (1, -1)
+    ]
+    return (sides[0] - sides[1]) / (2 * step)

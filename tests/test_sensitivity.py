@@ -1,20 +1,15 @@
-"""Sensitivities against closed forms, against differences, and against identities that they must obey."""
+"""Sensitivities against closed forms, and bad input."""
 
 from __future__ import annotations
 
 import casadi as ca
 import numpy as np
 import pytest
-from ascentwind.codegen.node_functions import node_functions
 from ascentwind.model import LinearSystem, define_system
-from ascentwind.model.assemble import vehicle_tables
 from ascentwind.model.errors import DirectNoiseError, TimeRangeError, UnknownNameError
-from ascentwind.runners import IntegratorOptions, Study
-from ascentwind.runners.adjoint import AdjointSolver
-from ascentwind.runners.collocation import Collocation, CompiledCollocation, Grid
+from ascentwind.runners import Study
 from ascentwind.runners.sensitivity import StructuralParameterError, UndefinedElasticityWarning, ZeroQuantityError
-from ascentwind.runners.sensitivity_check import _with_row, central_difference
-from ascentwind.runners.sensitivity_gradient import AdjointPair
+from ascentwind.runners.sensitivity_check import central_difference
 from scipy.optimize import minimize_scalar
 
 
@@ -93,7 +88,7 @@ def test_oscillator_with_a_parameter_in_its_output(w, z):
         return k**2 * g**2 * (1 - np.exp(-2 * z * w * s) * ripple) / (4 * z * w**3)
 
     d = found(system, 1.0 + s, "std")
-    # the phase error of the method, at most steps * 0.35^7 / 100800, is all that is left
+    # the phase error of the method, at most steps * 0.8^9 / 2.5e7, is all that is left
     assert d.attrs["variance"] == pytest.approx(variance(**values), rel=2e-7)
     for name in values:
         expected = derivative(lambda p, name=name: np.sqrt(variance(**(values | {name: p}))), values[name])
@@ -203,162 +198,6 @@ def test_one_source_alone():
     unit = 0.5 * (1 - np.exp(-4.0))
     np.testing.assert_allclose(found(system, 2.0)["derivative"], [2 * unit, 4 * unit], rtol=1e-9)
     np.testing.assert_allclose(found(system, 2.0, source="n")["derivative"], [0, 4 * unit], rtol=1e-9)
-
-
-# AS-504
-
-
-@pytest.fixture(scope="module")
-def at_75(as504):
-    return as504.sensitivity("bending_moment", 75.0, quantity="variance")
-
-
-def test_collocation_meets_cvodes(as504, at_75):
-    run = AdjointSolver(as504.with_means, IntegratorOptions(relative_tolerance=1e-12)).run(75.0)
-    assert at_75.attrs["variance"] == pytest.approx(run.variance[0].sum(), rel=1e-8)
-    assert at_75.attrs["mean"] == pytest.approx(run.mean[0], rel=1e-8)
-
-
-def test_every_parameter_against_differences_of_the_same_discretisation(as504):
-    """From wind alone, which no mean enters: rounding is all that stands between, so that small ones count too."""
-    functions = node_functions(as504.system)
-
-    def pair(changes: dict[str, float]) -> AdjointPair:
-        return AdjointPair(as504.with_parameters(changes).executable, functions, 0, 30.0, ("wind",), 0.05)
-
-    nominal = pair({})
-    gradient = nominal.gradient(1.0, 0.0).parameters
-    checked = 0
-    for i, (name, parameter) in enumerate(as504.parameters.items()):
-        elasticity = gradient[i] * parameter.value / nominal.variance
-        if abs(elasticity) < 1e-6:
-            continue
-        expected = central_difference(
-            lambda p, name=name: pair({name: p}).variance,
-            parameter.value,
-            0.02 * parameter.value,
-            levels=2,
-        )
-        assert gradient[i] == pytest.approx(expected.derivative, rel=1e-5), name
-        checked += 1
-    assert checked >= 30
-
-
-def test_parameters_and_rows_against_differences_of_cvodes(as504):
-    """Another integrator and no gradient; the centre of pressure's noise is there through the mean response."""
-    d = as504.check_sensitivity(
-        "bending_moment",
-        75.0,
-        quantity="mean_plus_3sigma",
-        parameters=["control.T1.gain", "center_of_pressure.sigma"],
-        rows=2,
-    )
-    assert d.sizes["item"] == 4
-    assert d["agrees"].all()
-    assert (d["apart"] <= 1e-5 * abs(d["difference"])).all()
-    assert (abs(d["uncertainty"]) <= 1e-4 * abs(d["difference"])).all()
-
-
-def test_the_mean_path_against_differences_of_cvodes(as504):
-    """The variance by centre-of-pressure noise follows the mean wind only through the mean response."""
-    d = as504.check_sensitivity(
-        "engine_angle", 60.0, quantity="variance", source="center_of_pressure", parameters=["wind.mean_scale"]
-    )
-    assert (d["apart"] <= 1e-5 * abs(d["difference"])).all()
-    # the mean is proportional to the mean wind, and the variance to the square of the mean
-    expected = 2 * d.attrs["quantity_value"]
-    assert d["derivative"].item() == pytest.approx(expected, rel=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("table", "argument", "step"),
-    [("altitude", 28.0, 1.0), ("wind_filter.H_1_1", 1500.0, 0.1), ("center_of_gravity", 30.0, 0.05)],
-)
-def test_rows_against_differences_of_the_same_discretisation(as504, table, argument, step):
-    """A row of the altitude moves the rate of climb, and the wind that is met; from wind alone, as above."""
-    d = as504.sensitivity("bending_moment", 30.0, source="wind", quantity="variance")
-    at = int(np.flatnonzero((d["knot_table"].values == table) & (d["knot_argument"].values == argument)).item())
-    row = int(np.sum(d["knot_table"].values[:at] == table))
-
-    def variance(value: float) -> float:
-        groups = vehicle_tables(_with_row(as504.vehicle, table, row, value))
-        executable = as504.executable.with_numbers(groups=groups)
-        return AdjointPair(executable, node_functions(as504.system), 0, 30.0, ("wind",)).variance
-
-    expected = central_difference(variance, float(d["knot_value"][at]), step)
-    assert expected.uncertainty < 1e-6 * abs(expected.derivative)
-    assert d["knot_derivative"][at].item() == pytest.approx(expected.derivative, rel=1e-5)
-
-
-def test_scaling_all_wind_scales_the_variance_by_the_square(at_75):
-    """Not term by term: sigma acts directly, the mean through the noise columns of thrust and centre of pressure."""
-    both = at_75["elasticity"].sel(parameter=["wind.sigma_scale", "wind.mean_scale"])
-    assert both.sum().item() == pytest.approx(2.0, rel=1e-8)
-    assert both.min().item() > 0.1
-
-
-def test_seconds_rows_and_kilometres_add_up_to_the_whole(at_75):
-    whole = at_75["table_elasticity"]
-    weighted = at_75["table_derivative"] * at_75["table_value"] * at_75["node_weight"]
-    at_end = at_75["table_derivative_at_end"] * at_75["table_value"].isel(t=-1)
-    total = (weighted.sum("t") + at_end) / at_75.attrs["value"]
-    np.testing.assert_allclose(total, whole, rtol=1e-3, atol=1e-6)  # the last node lies just before t2
-    rows = at_75["knot_elasticity"].groupby(at_75["knot_table"]).sum()
-    for table in ("mass", "thrust", "bending.1.frequency", "control.rate_factor", "wind_filter.H_1_1", "wind.mean"):
-        # the rows of a cubic, linear or step table carry a common factor exactly; of pchip to its differences
-        assert rows.sel(knot_table=table).item() == pytest.approx(whole.sel(table=table).item(), rel=1e-7), table
-    both = whole.sel(table=["altitude", "altitude_rate"]).sum().item()
-    assert rows.sel(knot_table="altitude").item() == pytest.approx(both, rel=1e-8)
-    for bands, parameter in (("sigma", "wind.sigma_scale"), ("mean", "wind.mean_scale")):
-        expected = at_75["elasticity"].sel(parameter=parameter).item()
-        assert at_75[f"wind_{bands}_elasticity"].sum().item() == pytest.approx(expected, rel=1e-9)
-
-
-def test_dimensional_analysis_of_the_networks(at_75):
-    """Numerator and denominator by one factor, gain and numerator: the same transfer function."""
-    e = at_75["elasticity"].to_series()
-    for network in ("T1", "T2", "T3"):
-        numerator = e[[n for n in e.index if n.startswith(f"control.{network}.numerator")]].sum()
-        denominator = e[[n for n in e.index if n.startswith(f"control.{network}.denominator")]].sum()
-        assert numerator == pytest.approx(-denominator, rel=1e-6)
-        assert numerator == pytest.approx(e[f"control.{network}.gain"], rel=1e-6)
-
-
-def test_compiled_collocation_is_that_by_lapack():
-    """Random stable matrices, with forcing, forward and backward; and the duality of both."""
-    random = np.random.default_rng(504)
-    library = node_functions(driven()).shared_library
-    assert library is not None
-    edges = np.cumsum(np.append(0.0, random.uniform(0.01, 0.1, 20)))
-    A = random.standard_normal((20, 3, 5, 5)) * (random.random((5, 5)) < 0.6) - 2 * np.eye(5)
-    x, a, f, g = *random.standard_normal((2, 5)), *random.standard_normal((2, 20, 3, 5))
-    grid = Grid(edges)
-    compiled, reference = CompiledCollocation(grid, A, library), Collocation(grid, A)
-    for one, other in zip(compiled.forward(x, f), reference.forward(x, f), strict=True):
-        np.testing.assert_allclose(one, other, rtol=1e-11, atol=1e-13)
-    for one, other in zip(compiled.backward(a, g), reference.backward(a, g), strict=True):
-        np.testing.assert_allclose(one, other, rtol=1e-11, atol=1e-13)
-    stages, end = compiled.forward(x, f)
-    adjoints, start = compiled.backward(a, g)
-    weights = grid.weights[..., None]
-    # a'x at both ends differs by the integral of a'f - x'g, exactly, as the method is symplectic
-    assert a @ end - start @ x == pytest.approx(np.sum(weights * (adjoints * f - stages * g)), abs=1e-12)
-
-
-def test_compiled_and_interpreted_agree(as504):
-    random = np.random.default_rng(504)
-    system, p = as504.system, as504.executable.parameters
-    compiled, interpreted = node_functions(system), node_functions(system, False)
-    assert compiled.shared_library is not None
-    t, v = np.array([40.0, 75.0, 120.0]), np.array([list(as504.tables(x).values()) for x in (40.0, 75.0, 120.0)])
-    a, x = random.standard_normal((2, 3, len(system.states)))
-    c, m = random.standard_normal((3, len(system.outputs))), random.standard_normal(len(system.noises))
-    for name, arguments in (("quadratic_gradient", (t, v, p, a, x, c, m)), ("linear_gradient", (t, v, p, a, x, c))):
-        ours, reference = (getattr(f, name)(*arguments) for f in (compiled, interpreted))
-        np.testing.assert_allclose(ours, reference, rtol=1e-10, atol=1e-12 * np.abs(reference).max())
-    matrices = as504.matrices(75.0)
-    for name, expected in zip("ABC", matrices[:3], strict=True):
-        np.testing.assert_allclose(compiled.matrices(t, v, p)[name][1], expected, rtol=1e-12, atol=1e-300)
 
 
 # bad input

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -37,6 +38,7 @@ class TankShape:
     volume_at_edges: NDArray[np.float64]
 
     @classmethod
+    @lru_cache(maxsize=64)
     def of(cls, tank: Tank) -> TankShape:
         """Return the shape of a tank.
 

@@ -9,8 +9,8 @@ on the free vehicle makes the moment
 
 because the vehicle answers with the accelerations F/m and M/I; mu is the mass per length with all liquid frozen, r the
 rotary inertia per length. At either end L vanishes whatever f is. Coefficients of 4-13: M'_alpha = L[q A c'_N],
-M'_beta = L of the control thrust at the gimbal plane, M'_eta = -int (x - s) mu Y + r Y' dx (modes are orthogonal to
-rigid motion: nothing answers), M'_xi = -m_k (X_S - s) forward of s.
+M'_beta = L of the control thrust at the gimbal plane, M'_eta = -int (x - s) mu Y dx (modes are orthogonal to rigid
+motion: nothing answers; sections of the beam have no rotary inertia), M'_xi = -m_k (X_S - s) forward of s.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from ...model.errors import DataError
 from .line_integrals import Line
 
-LARGEST_IMBALANCE = 1e-2
+LARGEST_IMBALANCE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,13 +116,13 @@ def load_coefficients(vehicle: LoadedVehicle, stations: NDArray[np.float64]) -> 
 
     engine = vehicle.control_thrust * np.where(stations < 0, -stations, 0.0)
     engine += vehicle.control_thrust * (second * center / inertia - first / mass)
-    displacement, rotation = _orthogonal_to_rigid_motion(vehicle, mass, center, inertia)
+    _refuse_modes_of_other_masses(vehicle, mass, center)
     ahead = np.maximum(vehicle.slosh_point[:, None] - stations, 0.0)
     air = vehicle.normal_force
     return LoadCoefficients(
         angle_of_attack=free(air),
         engine_angle=engine,
-        bending=-moment_about_station(mu * displacement, r * rotation),
+        bending=-moment_about_station(mu * vehicle.displacement),
         slosh=-vehicle.slosh_mass[:, None] * ahead,
         first_moment=first,
         second_moment=second,
@@ -132,23 +132,19 @@ def load_coefficients(vehicle: LoadedVehicle, stations: NDArray[np.float64]) -> 
     )
 
 
-def _orthogonal_to_rigid_motion(
-    vehicle: LoadedVehicle, mass: float, center: float, inertia: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the modes without the rigid motion that the beam's own mass matrix, another quadrature, leaves in them."""
+def _refuse_modes_of_other_masses(vehicle: LoadedVehicle, mass: float, center: float) -> None:
     line, x = vehicle.line, vehicle.line.points
-    momentum = line.total(vehicle.mass * vehicle.displacement)
-    turning = line.total(vehicle.mass * (x - center) * vehicle.displacement + vehicle.rotary_inertia * vehicle.rotation)
-    size = np.sqrt(line.total(vehicle.mass * vehicle.displacement**2))
-    left = np.maximum(np.abs(momentum) / (np.sqrt(mass) * size), np.abs(turning) / (np.sqrt(inertia) * size))
+    moving = vehicle.mass * vehicle.displacement
+    turning = line.total((x - center) * moving)
+    spread = line.total((x - center) ** 2 * vehicle.mass)
+    size = np.sqrt(line.total(moving * vehicle.displacement))
+    left = np.maximum(np.abs(line.total(moving)) / np.sqrt(mass), np.abs(turning) / np.sqrt(spread)) / size
     if (left > LARGEST_IMBALANCE).any():
         mode = int(np.argmax(left))
         raise DataError(
             f"bending mode {mode + 1} moves the vehicle's centre of gravity or turns it ({left[mode]:.1e} of its own "
             "size); compute modes and loads from the same masses"
         )
-    spin = (turning / inertia)[:, None]
-    return vehicle.displacement - (momentum / mass)[:, None] - spin * (x - center), vehicle.rotation - spin
 
 
 def load_columns(coefficients: LoadCoefficients, tanks: Sequence[str]) -> dict[tuple[str, str], NDArray[np.float64]]:

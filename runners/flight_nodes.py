@@ -1,0 +1,72 @@
+"""What all sensitivities of a flight share: nodes, tables and matrices at them, the solver, and the mean response."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..codegen.compiled import ExecutableSystem
+from ..codegen.node_functions import NodeFunctions, NodeMatrix
+from .collocation import Collocation, CompiledCollocation, collocation
+from .collocation_grid import STAGES, Grid, collocation_grid, longest_step, tables_at
+
+FROZEN = 7  # times at which the roots of A are looked at
+
+
+@dataclass(frozen=True, eq=False)
+class FlightNodes:
+    """A system on a grid of k steps with 4 k nodes.
+
+    Attributes
+    ----------
+    executable : ExecutableSystem
+        With its tables of the mean response filled in.
+    functions : NodeFunctions
+    grid : Grid
+    numbers : (n_z,) array
+        Of the parameters in force.
+    tables : (4 k, n_v) array
+        Values at the nodes.
+    matrices : dict of str to NodeMatrix
+        A, B, C, E, G and the known inputs at the nodes.
+    solver : Collocation or CompiledCollocation
+    """
+
+    executable: ExecutableSystem
+    functions: NodeFunctions
+    grid: Grid
+    numbers: NDArray[np.float64]
+    tables: NDArray[np.float64]
+    matrices: dict[str, NodeMatrix]
+    solver: Collocation | CompiledCollocation
+
+    @staticmethod
+    def until(
+        executable: ExecutableSystem, functions: NodeFunctions, times: Sequence[float], step: float | None = None
+    ) -> FlightNodes:
+        """Evaluate everything from the start to the last of the end times, s.
+
+        ``step`` is the longest step, s; from the roots of A without it.
+        """
+        system, numbers = executable.system, functions.numbers(executable.parameters)
+        if step is None:
+            spread = system.start + (max(times) - system.start) * (np.arange(FROZEN) + 0.5) / FROZEN
+            frozen = functions.matrices(spread, tables_at(executable.groups, spread), numbers)
+            step = longest_step(frozen["A"].dense)
+        grid = collocation_grid(system, executable.groups, times, step)
+        nodes = grid.nodes.ravel()
+        tables = tables_at(executable.groups, nodes)
+        matrices = functions.matrices(nodes, tables, numbers)
+        solver = collocation(grid, matrices["A"], functions.shared_library)
+        return FlightNodes(executable, functions, grid, numbers, tables, matrices, solver)
+
+    @cached_property
+    def mean(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """States of the mean response at the nodes (k, 4, n) and at the edges (k + 1, n)."""
+        n = len(self.executable.system.states)
+        known = self.matrices["E"].times(self.matrices["inputs"].dense[..., 0])
+        return self.solver.forward(np.zeros(n), known.reshape(-1, STAGES, n))

@@ -1,0 +1,4 @@
+"""Parameter studies: grids, one parameter at a time, dispersions; stored as they come, on this machine or a cluster."""
+
+from .run import ParameterStudy as ParameterStudy
+from .run import run_parameter_study as run_parameter_study
