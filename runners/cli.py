@@ -13,7 +13,7 @@ from rich.logging import RichHandler
 from rich.table import Table
 
 from ..model.errors import AscentwindError, AscentwindWarning
-from .cli_checks import sensitivity, tolerance, verify
+from .cli_checks import equations, sensitivity, tolerance, verify
 from .cli_wind import app as wind_app
 from .terminal import VehicleArgument, console, errors, progress_bar
 
@@ -24,7 +24,7 @@ app = typer.Typer(
     help="Response statistics of ascending launch vehicles in a random wind, by the method of adjoint systems.",
 )
 app.add_typer(wind_app, name="wind")
-for command in (verify, tolerance, sensitivity):
+for command in (verify, tolerance, sensitivity, equations):
     app.command()(command)
 
 
