@@ -23,7 +23,7 @@
  *   extra outputs: none
  *   full coupling: false
  *   states: 31
- *   table lengths: flight 63 x 175, wind 14 x 481, mean 3 x 2802
+ *   table lengths: flight 63 x 147, wind 14 x 481, mean 3 x 2802
  */
 
 #include <math.h>
@@ -122,9 +122,9 @@ static void lookup_group(double x, const double *data, int knots, int tables, in
 }
 
 static void lookup(Flight *f, double t, double (*v)[STAGES], int j) {
-  lookup_group(t, f->tables + 0, 175, 63, f->piece + 0, v + 0, j); /* flight */
-  lookup_group(v[3][j], f->tables + 44023, 481, 14, f->piece + 1, v + 63, j); /* wind */
-  lookup_group(t, f->tables + 71384, 2802, 3, f->piece + 2, v + 77, j); /* mean */
+  lookup_group(t, f->tables + 0, 147, 63, f->piece + 0, v + 0, j); /* flight */
+  lookup_group(v[3][j], f->tables + 36939, 481, 14, f->piece + 1, v + 63, j); /* wind */
+  lookup_group(t, f->tables + 64300, 2802, 3, f->piece + 2, v + 77, j); /* mean */
 }
 
 static void stage_matrices(const double (*restrict t)[STAGES], const double (*restrict v)[STAGES], const double *restrict p,
