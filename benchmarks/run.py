@@ -139,8 +139,8 @@ def report(results: list, found: dict[str, Rows], missing: list[str], took: floa
         "- diffrax is timed after its compilation.",
         "- NumPy ensembles that take at least 500 times as long as the sweep: "
         f"{_ensembles(results, ours[1], lambda ratio: ratio >= 500)}; those that take less: "
-        f"{_ensembles(results, ours[1], lambda ratio: ratio < 500)}. Their discretisation errors, without sampling, and "
-        "what the error of the sweep would cost them: docs/performance.md.",
+        f"{_ensembles(results, ours[1], lambda ratio: ratio < 500)}. Their discretisation errors, without sampling, "
+        "and what the error of the sweep would cost them: docs/performance.md.",
         "", "## Growth", "",
     ]  # fmt: skip
     for title, rows in found.items():

@@ -14,7 +14,8 @@ from rich.table import Table
 
 from ..model.errors import AscentwindError, AscentwindWarning
 from .cli_build import build_vehicle
-from .cli_checks import sensitivity, tolerance, verify
+from .cli_checks import equations, sensitivity, tolerance, verify
+from .cli_design import design
 from .cli_mean import mean
 from .cli_study import study
 from .cli_wind import app as wind_app
@@ -27,7 +28,7 @@ app = typer.Typer(
     help="Response statistics of ascending launch vehicles in a random wind, by the method of adjoint systems.",
 )
 app.add_typer(wind_app, name="wind")
-for command in (verify, tolerance, sensitivity, study, mean):
+for command in (verify, tolerance, sensitivity, equations, study, mean, design):
     app.command()(command)
 app.command("build-vehicle")(build_vehicle)
 

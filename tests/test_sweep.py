@@ -102,7 +102,7 @@ def test_tolerance_is_met_and_the_estimate_covers_the_error(as504, reference, to
     error = np.abs(np.sqrt(result.variance / reference[0]) - 1).max(axis=(1, 2))
     assert error.max() < tolerance
     estimate = result.error_estimate.transpose(0, 2, 1).max(axis=(1, 2))
-    # half a second after the start the thrust variance is tiny and the estimate up to 100 times too small
+    # half a second after the start the thrust variance is tiny and the estimate several times too small
     assert (error <= estimate)[1:].all()
     assert estimate.max() < 100 * tolerance
 
