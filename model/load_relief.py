@@ -66,15 +66,16 @@ def sensor_symbols(
     for name, entry in entries.items():
         prefix = f"control.{name}"
         where = f"position of the {name.replace('_', ' ')} sensor; its bending modes are tables and do not follow"
-        found[name] = Sensor(
-            parameters.add(f"{prefix}.position", entry.position_m, "m", where),
-            *(
-                ca.vertcat(ca.SX(0, 1), *(tables[f"{prefix}.{quantity}_{i}"] for i in range(1, modes + 1)))
-                for quantity in ("displacement", "slope")
-            ),
-            *transfer_function_symbols(name, entry.filter, parameters, entry.gain, GAIN_UNITS[name]),
-            tables[f"{prefix}.factor"] if entry.schedule else ca.SX(1),
+        position = parameters.add(f"{prefix}.position", entry.position_m, "m", where)
+        displacement, slope = (
+            ca.vertcat(ca.SX(0, 1), *(tables[f"{prefix}.{quantity}_{i}"] for i in range(1, modes + 1)))
+            for quantity in ("displacement", "slope")
         )
+        gain, numerator, denominator = transfer_function_symbols(
+            name, entry.filter, parameters, entry.gain, GAIN_UNITS[name]
+        )
+        factor = tables[f"{prefix}.factor"] if entry.schedule else ca.SX(1)
+        found[name] = Sensor(position, displacement, slope, gain, numerator, denominator, factor)
     return found
 
 

@@ -265,7 +265,7 @@ def _quantities(search: Search, before: NDArray[np.float64], after: NDArray[np.f
         found.append(Quantity(f"peak {response}", unit, *heights, *times, limit=problem.peak_limits.get(response)))
     frozen = [p.frozen for p in points if p.frozen is not None]
     if search.roots and len(frozen) == len(points):
-        for f, family in enumerate(search.roots.families):
+        for f, family in enumerate(search.families):
             least = [x.damping[:, f] for x in frozen]
             times = [problem.frozen_times[int(np.argmin(x))] for x in least]
             values = [float(x.min()) for x in least]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -97,7 +97,8 @@ def load_design(file: Path) -> DesignTask:
     problem = _problem(study, entry, entry.parameters)
     variants = {}
     if entry.trade is not None:
-        study._responses([entry.trade.response])
+        for limit in entry.trade.limits:  # a limit that makes no sense is told before anything is computed
+            replace(problem, peak_limits={**problem.peak_limits, entry.trade.response: limit})
         for name, parameters in (entry.trade.variants or {"all parameters": tuple(entry.parameters)}).items():
             for parameter in parameters:
                 if parameter not in entry.parameters:

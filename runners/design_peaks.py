@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ..codegen.node_functions import node_functions
 from ..model.errors import IntegrationError, UnstableSystemWarning
-from .sensitivity import Request
+from .flight_nodes import FlightNodes
+from .sensitivity_gradient import AdjointPair
 from .statistics import COMBINED
 from .sweep_engine import SweepOptions
 
@@ -42,14 +44,16 @@ def three_sigma(study: Study, responses: list[str], times: tuple[float, ...]) ->
 
 def gradients(study: Study, rows: Iterable[Row], parameters: tuple[str, ...]) -> dict[Row, NDArray[np.float64]]:
     """Return the derivatives of 3 sigma + sign * mean with respect to parameters by adjoint pairs, (n,) each."""
-    columns = [study.system.parameter_names.index(name) for name in parameters]
-    found, pairs = {}, {}
-    for row in rows:
-        response, sign, time = row
-        if (response, time) not in pairs:
-            request = Request.of(study, response, COMBINED, "mean_plus_3sigma")
-            pairs[response, time] = request, request.pair(study, time)
-        request, pair = pairs[response, time]
-        on_variance, on_mean = request.factors(pair)
-        found[row] = pair.gradient(on_variance, sign * on_mean).parameters[columns]
+    rows, system = list(rows), study.system
+    columns = [system.parameter_names.index(name) for name in parameters]
+    functions = node_functions(system, study.executable.shared_library is not None)
+    flight = FlightNodes.until(study.with_means, functions, sorted({time for _, _, time in rows}))
+    pairs = {
+        (response, time): AdjointPair(flight, system.output_index(response), time, system.sources)
+        for response, _, time in rows
+    }
+    found = {}
+    for response, sign, time in rows:
+        pair = pairs[response, time]
+        found[response, sign, time] = pair.gradient(1.5 / np.sqrt(pair.variance), sign).parameters[columns]
     return found

@@ -72,6 +72,8 @@ class LoadReliefProblem:
             study._check_times(list(self.frozen_times))
         if not self.parameters:
             raise DesignProblemError("a design needs at least one parameter that may change")
+        for name in (self.response, *self.peak_limits):
+            study.system.output_index(name)
         study._responses([self.response, *self.peak_limits])
         if self.response in self.peak_limits:
             raise DesignProblemError(f"the peak of '{self.response}' is minimised; a limit on it has no place")

@@ -17,7 +17,7 @@ from scipy.optimize import lsq_linear, minimize
 
 from .design_peaks import SIGNS, Row, gradients, three_sigma
 from .design_problem import LoadReliefProblem
-from .frozen_roots import FrozenDamping, FrozenRoots
+from .frozen_roots import FrozenDamping, FrozenRoots, root_families
 
 log = logging.getLogger(__name__)
 
@@ -72,6 +72,7 @@ class Search:
     def __init__(self, problem: LoadReliefProblem):
         self.problem = problem
         self.responses = [problem.response, *problem.peak_limits]
+        self.families = root_families(problem.study.system)
         executable = problem.study.executable
         self.roots = FrozenRoots(executable, problem.frozen_times, problem.names) if problem.frozen_times else None
         self.evaluations = self.derivatives = 0
@@ -111,7 +112,7 @@ class Search:
         parts = [(1 - point.peaks[1:] / allowed[:, None, None]).ravel()]
         if point.frozen is not None:
             for family, least in problem.damping_limits.items():
-                found = point.frozen.damping[:, self.roots.families.index(family)]
+                found = point.frozen.damping[:, self.families.index(family)]
                 parts.append((found - least) / max(abs(least), LEAST_DAMPING_SCALE))
             parts.append((problem.largest_growth - point.frozen.growth) / GROWTH_SCALE)
         return np.concatenate(parts)
@@ -135,27 +136,34 @@ class Search:
         parts = [-self._peak_gradients(u, i) / limit for i, limit in enumerate(problem.peak_limits.values(), start=1)]
         if point.frozen is not None:
             for family, least in problem.damping_limits.items():
-                slope = point.frozen.damping_gradient[:, self.roots.families.index(family)]
+                slope = point.frozen.damping_gradient[:, self.families.index(family)]
                 parts.append(slope * problem.span / max(abs(least), LEAST_DAMPING_SCALE))
             parts.append(-point.frozen.growth_gradient * problem.span / GROWTH_SCALE)
         return np.concatenate([np.zeros((0, n)), *parts])
 
     def _peak_gradients(self, u: NDArray[np.float64], response: int) -> NDArray[np.float64]:
         """Return derivatives of 3 sigma +- mean by position, (2 times, n), exact for the rows near the peak."""
-        name, values, times = self.responses[response], self.point(u).peaks[response], np.array(self.problem.times)
-        limit = self.problem.peak_limits.get(name, 0.0)
-        if name in self._last and values.max() < FAR * limit:
-            known = self._last[name]
-        else:
-            order = np.argsort(-values, axis=None)[:MOST_EXACT]
-            near = [np.unravel_index(k, values.shape) for k in order if values.flat[k] >= (1 - NEAR) * values.max()]
-            known = self._last[name] = self.exact(u, [(name, SIGNS[s], self.problem.times[k]) for s, k in near])
-        found = np.zeros((*values.shape, len(self.problem.names)))
+        name, times, n = self.responses[response], np.array(self.problem.times), len(self.problem.names)
+        wanted = {other: self._near(u, i) for i, other in enumerate(self.responses)}
+        exact = self.exact(u, [row for rows in wanted.values() for row in rows])  # of all responses, which share work
+        if wanted[name]:
+            self._last[name] = {row: exact[row] for row in wanted[name]}
+        known = self._last[name]
+        found = np.zeros((len(SIGNS), times.size, n))
         for s, sign in enumerate(SIGNS):
             rows = [row for row in known if row[1] == sign] or list(known)
             nearest = np.argmin(np.abs(times[:, None] - [row[2] for row in rows]), axis=1)
             found[s] = np.array([known[row] for row in rows])[nearest]
-        return found.reshape(-1, len(self.problem.names))
+        return found.reshape(-1, n)
+
+    def _near(self, u: NDArray[np.float64], response: int) -> list[Row]:
+        """Return the rows that need derivatives of their own; none for a peak far below its limit that had them."""
+        name, values = self.responses[response], self.point(u).peaks[response]
+        if name in self._last and values.max() < FAR * self.problem.peak_limits.get(name, 0.0):
+            return []
+        order = np.argsort(-values, axis=None)[:MOST_EXACT]
+        near = [np.unravel_index(k, values.shape) for k in order if values.flat[k] >= (1 - NEAR) * values.max()]
+        return [(name, SIGNS[s], self.problem.times[k]) for s, k in near]
 
     def exact(self, u: NDArray[np.float64], rows: list[Row]) -> dict[Row, NDArray[np.float64]]:
         """Return exact derivatives of rows by position."""

@@ -87,7 +87,9 @@ class FrozenRoots:
         A, dA = (m.full() for m in self._function(time, v, values))
         n = A.shape[0]
         dA = dA.reshape(n, n, -1, order="F")
-        roots, right = np.linalg.eig(A)
+        eigen = np.linalg.eig(A)
+        roots: NDArray[np.complex128] = eigen.eigenvalues.astype(np.complex128)
+        right: NDArray[np.complex128] = eigen.eigenvectors.astype(np.complex128)
         left = np.linalg.inv(right)
         share = np.abs(left * right.T)  # participation of states in roots; it does not depend on their units
         by_family = {f: share[:, self._of_state == f].sum(axis=1) for f in (*self.families, UNCONTROLLED)}

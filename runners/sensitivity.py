@@ -112,6 +112,12 @@ class Request:
         root = 0.5 / np.sqrt(pair.variance)
         return (root, 0.0) if self.quantity == "std" else (3 * root, 1.0)
 
+    def curvature(self, pair: AdjointPair) -> float:
+        """Return d2Q/dVar2."""
+        if self.quantity in ("variance", "mean"):
+            return 0.0
+        return (1 if self.quantity == "std" else 3) * -0.25 * pair.variance**-1.5
+
     def value(self, variance: float, mean: float) -> float:
         """Return the quantity."""
         std = float(np.sqrt(max(variance, 0.0)))
@@ -131,14 +137,7 @@ def sensitivity(
     request = Request.of(study, response, source, quantity)
     rows = parameter_rows(study.system, parameters)
     at_peak = isinstance(time, str)
-    if isinstance(time, str):
-        if time != "peak":
-            raise TimeRangeError(f"'{time}' is not a time; give seconds or 'peak'")
-        time, at_limit = peak_time(study, request)
-    else:
-        time, at_limit = float(time), False
-    study._check_times([time])
-    check_end_time(study, time)
+    time, at_limit = end_time(study, request, time)
     warn_if_unstable(study.executable, time)
     pair = request.pair(study, time)
     gradient = pair.gradient(*request.factors(pair))
@@ -175,6 +174,24 @@ def sensitivity(
         "steps": pair.steps,
     }
     return dataset
+
+
+def end_time(study: Study, request: Request, time: float | str) -> tuple[float, bool]:
+    """Return an end time, s, that of the peak for 'peak', and whether that is an end of the range searched.
+
+    Raises
+    ------
+    TimeRangeError
+    """
+    if isinstance(time, str):
+        if time != "peak":
+            raise TimeRangeError(f"'{time}' is not a time; give seconds or 'peak'")
+        time, at_limit = peak_time(study, request)
+    else:
+        time, at_limit = float(time), False
+    study._check_times([time])
+    check_end_time(study, time)
+    return time, at_limit
 
 
 def check_end_time(study: Study, time: float) -> None:

@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 
 STEPS = ("mean flight", "mass properties", "aerodynamics", "slosh", "bending modes", "loads")
-STATIONS_ALONG = 41  # between the ends of the vehicle
+STATIONS_ALONG = 31  # between the ends of the vehicle
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +91,9 @@ def compute_vehicle(
     slope, center = aerodynamics.normal_force(construction, flight.mach, flight.time)
     done(STEPS[2])
     slosh = {
-        tank.name: slosh_history(construction, tank.name, flight.liquid[tank.name], flight.axial_acceleration)
+        tank.name: slosh_history(
+            construction, tank.name, flight.liquid[tank.name], flight.axial_acceleration, flight.time
+        )
         for tank in construction.tanks
         if tank.sloshes
     }
