@@ -8,11 +8,13 @@ from itertools import pairwise
 import casadi as ca
 import numpy as np
 
-from . import bending, rigid_body, slosh
+from . import bending, load_relief, rigid_body, slosh
 from .control import TransferFunction, transfer_function, transfer_function_symbols
 from .coupling import accelerations
 from .errors import DataError
-from .loads import bending_moment
+from .load_components import load_components
+from .loads import bending_moment, slosh_reaction, typical_moment
+from .local_aerodynamics import local_bending_moment, local_forces
 from .noise import NoiseProcess, noise_process
 from .symbols import ParameterSymbols, TableSymbols
 from .system import LinearSystem, Noise, Output, State
@@ -37,8 +39,9 @@ SCALES = {
     "bending_rate": 0.5,
     "slosh": 0.5,
     "slosh_rate": 1.0,
-    "bending_moment": 1e7,
     "dynamic_pressure_times_angle_of_attack": 1e3,
+    "bending_acceleration": 3.0,
+    "slosh_acceleration": 3.0,
 }
 
 
@@ -105,6 +108,7 @@ def assemble(vehicle: Vehicle, wind_start_covariance: np.ndarray) -> LinearSyste
     noises = {n: noise_process(n, e, parameters) for n, e in vehicle.noise.items()}
     sigma_scale = parameters.add("wind.sigma_scale", 1.0, "1", "factor on the wind's standard deviation")
     mean_scale = parameters.add("wind.mean_scale", 1.0, "1", "factor on the mean wind")
+    sensors = load_relief.sensor_symbols(vehicle.file.control.load_relief, modes, tables, parameters)
 
     lateral_velocity, attitude, attitude_rate = (
         ca.SX.sym(n) for n in ("lateral_velocity", "attitude", "attitude_rate")
@@ -119,17 +123,18 @@ def assemble(vehicle: Vehicle, wind_start_covariance: np.ndarray) -> LinearSyste
     measured_rate = attitude_rate + sensor_slopes.T @ eta_rate
     T1 = transfer_function("T1", *networks["T1"], measured)
     T2 = transfer_function("T2", *networks["T2"], measured_rate)
-    attitude_factor, rate_factor = tables["control.attitude_factor"], tables["control.rate_factor"]
-    T3 = transfer_function("T3", *networks["T3"], attitude_factor * T1.output + rate_factor * T2.output)
-
     alpha_of_state = rigid_body.angle_of_attack(tables, attitude, lateral_velocity, wind.wind + mean_wind)
-    beta_of_state = T3.output + bending.mode_column(tables, modes, "slope_at_gimbal").T @ eta
     alpha, beta = ca.SX.sym("alpha"), ca.SX.sym("beta")
     slopes = bending.slopes(tables, modes, tanks)
     moment = rigid_body.yaw_moment(tables, area, alpha, beta)
     slosh_mass = slosh.tank_column(tables, tanks, "mass")
     if options.full_coupling:
         moment += tables["axial_acceleration"] * ca.sum1(slosh_mass * xi)
+    force = rigid_body.lateral_force(tables, area, alpha, beta, attitude)
+    modal_force = bending.generalized_force(tables, area, bending_damping, eta, eta_rate, alpha, beta)
+    if options.local_angle_of_attack:
+        local = local_forces(tables, area, attitude_rate, eta, eta_rate)
+        force, moment, modal_force = force + local.force, moment + local.moment, modal_force + local.modal
     solved = accelerations(
         mass=tables["mass"],
         inertia=tables["moment_of_inertia"],
@@ -137,18 +142,32 @@ def assemble(vehicle: Vehicle, wind_start_covariance: np.ndarray) -> LinearSyste
         slosh_mass=slosh_mass,
         arms=slosh.attach_arms(tables, tanks),
         displacements=bending.displacements(tables, modes, tanks),
-        force=rigid_body.lateral_force(tables, area, alpha, beta, attitude),
+        force=force,
         moment=moment,
-        modal_force=bending.generalized_force(tables, area, bending_damping, eta, eta_rate, alpha, beta)
-        + slosh.slosh_stiffness_force(tables, tanks, slopes, xi),
+        modal_force=modal_force + slosh.slosh_stiffness_force(tables, tanks, slopes, xi),
         slosh_forcing=slosh.slosh_forcing(tables, tanks, slosh_damping, xi, xi_rate, attitude, eta, slopes),
         full=options.full_coupling,
     )
+    signals = {}
+    if "accelerometer" in sensors:
+        signals["accelerometer"] = load_relief.sensed_acceleration(
+            tables, sensors["accelerometer"], solved, attitude, eta
+        )
+    if "angle_of_attack" in sensors:
+        signals["angle_of_attack"] = load_relief.sensed_angle_of_attack(
+            tables, sensors["angle_of_attack"], alpha, attitude_rate, eta, eta_rate
+        )
+    relief = {name: sensors[name].feedback(name, signal) for name, signal in signals.items()}
+    attitude_factor, rate_factor = tables["control.attitude_factor"], tables["control.rate_factor"]
+    command = attitude_factor * T1.output + rate_factor * T2.output
+    T3 = transfer_function("T3", *networks["T3"], sum((F.output for F in relief.values()), command))
+    beta_of_state = T3.output + bending.mode_column(tables, modes, "slope_at_gimbal").T @ eta
     blocks = [
         (lateral_velocity, solved.lateral, [State("lateral_velocity", "m/s", SCALES["lateral_velocity"])]),
         (attitude, attitude_rate, [State("attitude", "rad", SCALES["angle"])]),
         (attitude_rate, solved.rotation, [State("attitude_rate", "rad/s", SCALES["angle"])]),
         *((T.states, T.derivative, _filter_states(name, T)) for name, T in (("T1", T1), ("T2", T2), ("T3", T3))),
+        *((F.states, F.derivative, load_relief.filter_states(name, F)) for name, F in relief.items()),
         (eta, eta_rate, _numbered("bending", modes, "m", SCALES["bending"])),
         (eta_rate, solved.bending, _numbered("bending_rate", modes, "m/s", SCALES["bending_rate"])),
         (xi, xi_rate, [State(f"slosh_{t}", "m", SCALES["slosh"]) for t in tanks]),
@@ -156,13 +175,17 @@ def assemble(vehicle: Vehicle, wind_start_covariance: np.ndarray) -> LinearSyste
         (wind.states, wind.derivative, _numbered("wind", wind.states.numel(), "1", 1.0)),
         *((p.state, p.derivative, [State(f"deviation_{n}")] * p.state.numel()) for n, p in noises.items()),
     ]
-    outputs: list[tuple[Output, ca.SX]] = [
-        (
-            Output(load.output, "N m", SCALES["bending_moment"], f"B.M. at station {load.station_m:g} m"),
-            bending_moment(tables, load.output, tanks, alpha, beta, solved.bending, solved.slosh),
-        )
-        for load in vehicle.file.loads
-    ]
+    outputs: list[tuple[Output, ca.SX]] = []
+    for load in vehicle.file.loads:
+        value = bending_moment(tables, load.output, tanks, alpha, beta, solved.bending, solved.slosh)
+        if options.local_angle_of_attack:
+            value += local_bending_moment(tables, load.output, attitude_rate, eta, eta_rate)
+        if options.slosh_reaction:
+            assert load.forward_of_gimbal_m is not None  # checked by load_vehicle
+            value += slosh_reaction(tables, load.output, tanks, load.forward_of_gimbal_m, xi, solved.slosh)
+        scale = typical_moment(vehicle.tables[f"loads.{load.output}.angle_of_attack"])
+        output = Output(load.output, "N m", scale, f"B.M. at station {load.station_m:g} m")
+        outputs.append((output, value))
     outputs.append((Output("angle_of_attack", "rad", SCALES["angle"], "alpha"), alpha))
     outputs.append((Output("engine_angle", "rad", SCALES["angle"], "beta"), beta))
     for extra in dict.fromkeys(options.extra_outputs):
@@ -172,6 +195,8 @@ def assemble(vehicle: Vehicle, wind_start_covariance: np.ndarray) -> LinearSyste
             outputs.append((Output(extra, "m", SCALES["lateral_position"], "Y"), drift))
         elif extra == "drift_rate":
             outputs.append((Output(extra, "m/s", SCALES["lateral_velocity"], "Y'"), lateral_velocity))
+        elif extra == "load_components":
+            outputs += load_components(tanks, SCALES, attitude_rate, eta, eta_rate, solved.bending, xi, solved.slosh)
         else:
             q_alpha = tables["dynamic_pressure"] * alpha
             outputs.append((Output(extra, "Pa rad", SCALES[extra], "q alpha"), q_alpha))
@@ -292,7 +317,11 @@ def _start_covariance(
 
 def _structure(vehicle: Vehicle, states: Sequence[State], groups: Sequence[TableGroup]) -> dict[str, str]:
     orders = (f"{n} {len(e.denominator) - 1}" for n, e in vehicle.transfer_functions.items())
+    relief = ", ".join(
+        f"{n} of order {len(e.filter.denominator) - 1}" for n, e in vehicle.file.control.load_relief.items()
+    )
     return {
+        **({"load relief": relief} if relief else {}),
         "bending modes": str(len(vehicle.bending)),
         "slosh tanks": ", ".join(t.name for t in vehicle.slosh) or "none",
         "transfer function orders": ", ".join(orders),
@@ -301,6 +330,8 @@ def _structure(vehicle: Vehicle, states: Sequence[State], groups: Sequence[Table
         "loads": ", ".join(load.output for load in vehicle.file.loads),
         "extra outputs": ", ".join(vehicle.file.options.extra_outputs) or "none",
         "full coupling": str(vehicle.file.options.full_coupling).lower(),
+        **({"local angle of attack": "true"} if vehicle.file.options.local_angle_of_attack else {}),
+        **({"slosh reaction": "true"} if vehicle.file.options.slosh_reaction else {}),
         "states": str(len(states)),
         "table lengths": ", ".join(f"{g.name} {len(g.names)} x {g.knots.size}" for g in groups),
     }

@@ -27,16 +27,24 @@ class TransferFunction:
 
 
 def transfer_function_symbols(
-    name: str, entry: TransferFunctionEntry, parameters: ParameterSymbols
+    name: str, entry: TransferFunctionEntry, parameters: ParameterSymbols, gain: float = 1.0, unit: str = "1"
 ) -> tuple[ca.SX, ca.SX, ca.SX]:
     """Declare gain, numerator and denominator of a transfer function as parameters.
+
+    Parameters
+    ----------
+    name : str
+    entry : TransferFunctionEntry
+    parameters : ParameterSymbols
+    gain, unit : float, str
+        Value and unit of the gain.
 
     Returns
     -------
     gain, numerator, denominator : SX
         Coefficients in descending powers; those that are zero in the data stay zero.
     """
-    gain = parameters.add(f"control.{name}.gain", 1.0, "1", f"factor on {name}(s)")
+    factor = parameters.add(f"control.{name}.gain", gain, unit, f"factor on {name}(s)")
 
     def symbols(kind: str, values: tuple[float, ...]) -> ca.SX:
         return ca.vertcat(
@@ -48,7 +56,7 @@ def transfer_function_symbols(
             )
         )
 
-    return gain, symbols("numerator", entry.numerator), symbols("denominator", entry.denominator)
+    return factor, symbols("numerator", entry.numerator), symbols("denominator", entry.denominator)
 
 
 def transfer_function(name: str, gain: ca.SX, numerator: ca.SX, denominator: ca.SX, signal: ca.SX) -> TransferFunction:
@@ -67,7 +75,7 @@ def transfer_function(name: str, gain: ca.SX, numerator: ca.SX, denominator: ca.
     w0 = ca.fabs(a[lowest]) ** (1.0 / lowest) if lowest else ca.SX(1)
     x = ca.SX.sym(name, n)
     last = signal - sum((a[n - k] / w0 ** (n - k) * x[k] for k in range(n)), ca.SX(0))
-    derivative = w0 * ca.vertcat(x[1:], last)
+    derivative = w0 * ca.vertcat(*(x[k] for k in range(1, n)), last)
     direct = b[0]
     output = direct * signal + sum(((b[n - k] - direct * a[n - k]) / w0 ** (n - k) * x[k] for k in range(n)), ca.SX(0))
     return TransferFunction(x, derivative, gain * output)

@@ -5,14 +5,16 @@ from __future__ import annotations
 import csv
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .errors import DataError, suggestion
 
+Order = Literal["increasing", "not decreasing", "any"]
 _HEADER = re.compile(r"^\s*(?P<name>[^\[\]]+?)\s*\[(?P<unit>[^\[\]]*)\]\s*$")
 
 
@@ -24,6 +26,7 @@ class CsvTable:
     units: dict[str, str]
     columns: dict[str, NDArray[np.float64]]
     lines: tuple[int, ...]
+    text: dict[str, tuple[str, ...]] = field(default_factory=dict)
 
     def column(self, name: str, unit: str) -> NDArray[np.float64]:
         """Return a column after checking its unit.
@@ -57,8 +60,15 @@ class CsvTable:
             )
 
 
-def read_csv_table(file: Path, argument: str, unit: str) -> CsvTable:
-    """Read a table whose argument column increases from row to row.
+def read_csv_table(
+    file: Path,
+    argument: str,
+    unit: str,
+    *,
+    order: Order = "increasing",
+    text: tuple[str, ...] = (),
+) -> CsvTable:
+    """Read a table and check the order of its rows.
 
     Parameters
     ----------
@@ -66,47 +76,33 @@ def read_csv_table(file: Path, argument: str, unit: str) -> CsvTable:
         Lines that start with ``#`` are comments (provenance).
     argument, unit : str
         Name and unit of the argument column, such as 'time', 's'.
+    order : str
+        What the argument must do from row to row.
+    text : tuple of str
+        Columns of words, which the file must have; their headers carry no unit.
 
     Raises
     ------
     DataError
         Missing file, header without units, a cell that is not a finite number, rows out of order or repeated.
     """
-    try:
-        text = file.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise DataError(
-            f"cannot be read ({error.strerror or error}); check the name in the TOML file", file=file
-        ) from None
-    except UnicodeDecodeError:
-        raise DataError("is not UTF-8 text; save it as CSV", file=file) from None
-    rows = [
-        (number, cells)
-        for number, cells in enumerate(csv.reader(text.splitlines()), start=1)
-        if cells and any(c.strip() for c in cells) and not cells[0].lstrip().startswith("#")
-    ]
-    if len(rows) < 3:
-        raise DataError("needs a header and at least two rows", file=file)
+    rows = _read_rows(file)
+    if len(rows) < (2 if order == "any" else 3):
+        raise DataError(f"needs a header and at least {'one row' if order == 'any' else 'two rows'}", file=file)
     (header_line, header), body = rows[0], rows[1:]
-    names, units = [], {}
-    for cell in header:
-        match = _HEADER.match(cell)
-        if not match:
-            raise DataError(
-                f"header '{cell.strip()}' has no unit; write it as 'name [unit]', [1] if it has none",
-                file=file,
-                row=header_line,
-            )
-        name = match["name"]
-        if name in units:
-            raise DataError("stands twice in the header", file=file, column=name, row=header_line)
-        names.append(name)
-        units[name] = match["unit"].strip()
+    names, units = _read_header(file, header_line, header, text)
+    for name in text:
+        if name not in names:
+            raise DataError(f"column '{name}' is missing; add it, its header without a unit", file=file)
     data = np.empty((len(body), len(names)))
     for i, (line, cells) in enumerate(body):
         if len(cells) != len(names):
             raise DataError(f"has {len(cells)} cells where the header has {len(names)}", file=file, row=line)
         for j, cell in enumerate(cells):
+            if names[j] in text:
+                if not cell.strip():
+                    raise DataError("is empty; fill the cell", file=file, column=names[j], row=line)
+                continue
             try:
                 data[i, j] = float(cell)
             except ValueError:
@@ -118,13 +114,59 @@ def read_csv_table(file: Path, argument: str, unit: str) -> CsvTable:
                     column=names[j],
                     row=line,
                 )
-    table = CsvTable(file, units, {n: data[:, j] for j, n in enumerate(names)}, tuple(line for line, _ in body))
+    table = CsvTable(
+        file,
+        units,
+        {n: data[:, j] for j, n in enumerate(names) if n not in text},
+        tuple(line for line, _ in body),
+        {n: tuple(cells[j].strip() for _, cells in body) for j, n in enumerate(names) if n in text},
+    )
     x = table.column(argument, unit)
+    if order == "any":
+        return table
     steps = np.diff(x)
-    if not (steps > 0).all():
-        i = int(np.argmin(steps > 0))
+    good = steps > 0 if order == "increasing" else steps >= 0
+    if not good.all():
+        i = int(np.argmin(good))
         why = "repeats the row above" if steps[i] == 0 else f"comes after {x[i]:g}"
         raise DataError(
             f"{x[i + 1]:g} {why}; sort the rows and keep each once", file=file, column=argument, row=table.lines[i + 1]
         )
     return table
+
+
+def _read_rows(file: Path) -> list[tuple[int, list[str]]]:
+    """Return line number and cells of every line that is neither empty nor a comment."""
+    try:
+        content = file.read_text(encoding="utf-8-sig")
+    except OSError as error:
+        raise DataError(
+            f"cannot be read ({error.strerror or error}); check the name in the TOML file", file=file
+        ) from None
+    except UnicodeDecodeError:
+        raise DataError("is not UTF-8 text; save it as CSV", file=file) from None
+    return [
+        (number, cells)
+        for number, cells in enumerate(csv.reader(content.splitlines()), start=1)
+        if cells and any(c.strip() for c in cells) and not cells[0].lstrip().startswith("#")
+    ]
+
+
+def _read_header(file: Path, line: int, header: list[str], text: tuple[str, ...]) -> tuple[list[str], dict[str, str]]:
+    names: list[str] = []
+    units: dict[str, str] = {}
+    for cell in header:
+        match = _HEADER.match(cell)
+        name = match["name"] if match else cell.strip()
+        if not match and name not in text:
+            raise DataError(
+                f"header '{cell.strip()}' has no unit; write it as 'name [unit]', [1] if it has none",
+                file=file,
+                row=line,
+            )
+        if name in names:
+            raise DataError("stands twice in the header", file=file, column=name, row=line)
+        names.append(name)
+        if match:
+            units[name] = match["unit"].strip()
+    return names, units

@@ -63,6 +63,10 @@ class SingularCouplingError(AscentwindError):
     """The mass matrix that couples bending and slosh cannot be inverted."""
 
 
+class ModeError(AscentwindError):
+    """A bending mode cannot be normalised, or not be followed from one time to the next."""
+
+
 class IntegrationError(AscentwindError):
     """An integrator gave up before the end of the interval."""
 

@@ -1,12 +1,41 @@
-"""Bending moment at a station: equation 4-13."""
+"""Bending moment at a station: equation 4-13, the rigid body's answer to slosh, and what moments are made of."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 import casadi as ca
+import numpy as np
 
+from .slosh import attach_arms, tank_column
 from .symbols import TableSymbols
+from .tables import Table
+
+TYPICAL_ANGLE = 0.1  # rad: of the angle of attack in strong wind near the greatest dynamic pressure
+
+
+def typical_moment(angle_of_attack_coefficient: Table) -> float:
+    """Return the size of the bending moment (N m) that weighs integration errors: the largest M'_alpha times 0.1 rad.
+
+    A power of ten, since scales are written into the generated code: numbers of a table may change, and only one that
+    changes by a decade costs a compilation.
+    """
+    largest = TYPICAL_ANGLE * float(np.abs(angle_of_attack_coefficient.values).max())
+    return 10.0 ** round(np.log10(largest)) if largest > 0 else 1.0
+
+
+# columns of a load's table by which the rigid body answers slosh: S_1, S_2
+REACTION_COLUMNS = (("first_moment", "kg m", ""), ("second_moment", "kg m2", ""))
+
+
+def load_columns(modes: int, tanks: Sequence[str]) -> tuple[tuple[str, str, str], ...]:
+    """Return the columns of a load's table: name, unit, sign."""
+    return (
+        ("angle_of_attack", "N m/rad", ""),
+        ("engine_angle", "N m/rad", ""),
+        *((f"bending_{i}", "N s2", "") for i in range(1, modes + 1)),
+        *((f"slosh_{tank}", "N s2", "") for tank in tanks),
+    )
 
 
 def bending_moment(
@@ -26,3 +55,24 @@ def bending_moment(
     for i, tank in enumerate(tanks):
         moment += coefficients[f"slosh_{tank}"] * xi_acceleration[i]
     return moment
+
+
+def slosh_reaction(
+    tables: TableSymbols,
+    output: str,
+    tanks: Sequence[str],
+    forward_of_gimbal: float,
+    xi: ca.SX,
+    xi_acceleration: ca.SX,
+) -> ca.SX:
+    """What 4-13 leaves out of slosh: the weight of displaced liquid, and the answer of the whole vehicle, N m.
+
+    sum_k m_k [S_1 / m + (X_Sk - X_CG) S_2 / I_ZZ] xi_k'' + A_X m_k [1 (X_Sk > s) - S_2 / I_ZZ] xi_k
+    """
+    coefficients = tables.under(f"loads.{output}.")
+    mass = tank_column(tables, tanks, "mass")
+    turning = coefficients["second_moment"] / tables["moment_of_inertia"]
+    inertia = mass * (coefficients["first_moment"] / tables["mass"] + attach_arms(tables, tanks) * turning)
+    forward = tank_column(tables, tanks, "attach_point") > forward_of_gimbal
+    weight = tables["axial_acceleration"] * mass * (forward - turning)
+    return ca.dot(inertia, xi_acceleration) + ca.dot(weight, xi)

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from .csv_table import CsvTable, read_csv_table
 from .errors import DataError, suggestion
+from .load_relief import SCHEDULE_COLUMNS, mode_columns
+from .loads import REACTION_COLUMNS, load_columns
+from .local_aerodynamics import PREFIX, local_columns, local_load_columns
 from .tables import Table
 from .vehicle_file import (
     BendingEntry,
@@ -104,13 +109,15 @@ class Vehicle:
         return {"T1": self.file.control.T1, "T2": self.file.control.T2, "T3": self.file.control.T3}
 
 
-def load_vehicle(folder: Path) -> Vehicle:
+def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehicle:
     """Load a vehicle folder.
 
     Parameters
     ----------
     folder : Path
         Holds ``vehicle.toml`` and the CSV files it names.
+    changes : mapping, optional
+        Values to put in the place of the file's, by dotted key; see ``read_vehicle_file``.
 
     Raises
     ------
@@ -120,7 +127,7 @@ def load_vehicle(folder: Path) -> Vehicle:
     toml = folder / VEHICLE_FILE
     if not toml.is_file():
         raise DataError(f"holds no {VEHICLE_FILE}; start from 'ascentwind new-vehicle DIR --from as504'", file=folder)
-    file = read_vehicle_file(toml)
+    file = read_vehicle_file(toml, changes)
     reader = _Reader(folder, toml, file)
     for name, columns in (
         ("rigid_body", RIGID_BODY),
@@ -130,6 +137,7 @@ def load_vehicle(folder: Path) -> Vehicle:
     ):
         reader.add(name, getattr(file.tables, name), columns)
     reader.add("control.gains", file.control.gains, GAINS, "control.")
+    _add_load_relief(reader, file)
     tanks = [tank.name for tank in file.slosh]
     if len(set(tanks)) < len(tanks):
         raise DataError("two slosh tanks have the same name; rename one", file=toml, column="slosh")
@@ -141,8 +149,19 @@ def load_vehicle(folder: Path) -> Vehicle:
     if len(set(outputs)) < len(outputs):
         raise DataError("two loads have the same output name; rename one", file=toml, column="loads")
     for load in file.loads:
-        columns = _load_columns(len(file.bending), tanks)
-        reader.add(f"loads.{load.output}", load.table, columns, f"loads.{load.output}.")
+        columns = load_columns(len(file.bending), tanks)
+        if file.options.slosh_reaction:
+            if load.forward_of_gimbal_m is None:
+                raise DataError(
+                    "is missing, but options.slosh_reaction needs it; give metres forward of the gimbal plane",
+                    file=toml,
+                    column=f"loads.{load.output}.forward_of_gimbal_m",
+                )
+            columns += REACTION_COLUMNS
+        unused = () if file.options.slosh_reaction else REACTION_COLUMNS
+        reader.add(f"loads.{load.output}", load.table, columns, f"loads.{load.output}.", unused)
+    if file.options.local_angle_of_attack:
+        _add_local(reader, file)
     for name, noise in file.noise.items():
         for table in noise.tables:
             if table not in reader.tables:
@@ -150,7 +169,7 @@ def load_vehicle(folder: Path) -> Vehicle:
                     f"there is no table '{table}'{suggestion(table, reader.tables)}", file=toml, column=f"noise.{name}"
                 )
     wind = _load_wind(folder, file.wind, reader)
-    timed = [s for s in reader.sources if s.name not in ("wind", "wind.filter", "control.gains")]
+    timed = [s for s in reader.sources if not s.name.startswith(("wind", "control."))]
     first, last = max(timed, key=lambda s: s.first), min(timed, key=lambda s: s.last)
     start = file.start_time_s
     if start < first.first:
@@ -180,6 +199,37 @@ def load_vehicle(folder: Path) -> Vehicle:
     )
 
 
+def _add_load_relief(reader: _Reader, file: VehicleFile) -> None:
+    """Read gain schedules and bending modes of the load-relief sensors."""
+    for sensor, entry in file.control.load_relief.items():
+        prefix = f"control.{sensor}."
+        if entry.schedule:
+            reader.add(f"{prefix}schedule", entry.schedule, SCHEDULE_COLUMNS, prefix)
+        if entry.modes:
+            reader.add(f"load_relief.{sensor}", entry.modes, mode_columns(len(file.bending)), prefix)
+        elif file.bending:
+            columns = ", ".join(f"{name} [{unit}]" for name, unit, _ in mode_columns(len(file.bending)))
+            raise DataError(
+                f"is missing; name a table of {columns} at the sensor", file=reader.toml, column=f"{prefix}modes"
+            )
+
+
+def _add_local(reader: _Reader, file: VehicleFile) -> None:
+    """Read the integrals that the option local_angle_of_attack needs."""
+    modes, missing = (
+        len(file.bending),
+        "is missing, but options.local_angle_of_attack needs it; 'ascentwind build-vehicle' makes it",
+    )
+    if file.tables.local_aerodynamics is None:
+        raise DataError(missing, file=reader.toml, column="tables.local_aerodynamics")
+    reader.add("local_aerodynamics", file.tables.local_aerodynamics, local_columns(modes), PREFIX)
+    for load in file.loads:
+        if load.local is None:
+            raise DataError(missing, file=reader.toml, column=f"loads.{load.output}.local")
+        name = f"{PREFIX}loads.{load.output}"
+        reader.add(name, load.local, local_load_columns(modes), f"{name}.")
+
+
 class _Reader:
     """Collects tables, their sources and the times at which they jump."""
 
@@ -189,14 +239,14 @@ class _Reader:
         self.sources: list[TableSource] = []
         self.discontinuities: set[float] = set()
 
-    def read(self, name: str, entry: TableEntry, columns, argument: str, unit: str) -> CsvTable:
+    def read(self, name: str, entry: TableEntry, columns, argument: str, unit: str, unused=()) -> CsvTable:
         csv = read_csv_table(self.folder / entry.file, argument, unit)
         x = csv.columns[argument]
         for column, column_unit, sign in columns:
             csv.column(column, column_unit)
             if sign:
                 csv.require_positive(column, allow_zero=sign == "0")
-        unknown = set(csv.columns) - {c for c, _, _ in columns} - {argument}
+        unknown = set(csv.columns) - {c for c, _, _ in (*columns, *unused)} - {argument}
         if unknown:
             name = sorted(unknown)[0]
             raise DataError(
@@ -207,8 +257,8 @@ class _Reader:
         self.sources.append(TableSource(name, csv.file, entry.status, entry.source, float(x[0]), float(x[-1])))
         return csv
 
-    def add(self, name: str, entry: TableEntry, columns, prefix: str = "") -> None:
-        csv = self.read(name, entry, columns, "time", "s")
+    def add(self, name: str, entry: TableEntry, columns, prefix: str = "", unused=()) -> None:
+        csv = self.read(name, entry, columns, "time", "s", unused)
         for event in entry.events:
             if event not in self.events:
                 raise DataError(
@@ -261,15 +311,6 @@ def _bending_columns(tanks: list[str]):
         ("normal_force_slope_times_displacement", "1/rad", ""),
         *((f"displacement_at_{tank}", "1", "") for tank in tanks),
         *((f"slope_at_{tank}", "1/m", "") for tank in tanks),
-    )
-
-
-def _load_columns(modes: int, tanks: list[str]):
-    return (
-        ("angle_of_attack", "N m/rad", ""),
-        ("engine_angle", "N m/rad", ""),
-        *((f"bending_{i}", "N s2", "") for i in range(1, modes + 1)),
-        *((f"slosh_{tank}", "N s2", "") for tank in tanks),
     )
 
 

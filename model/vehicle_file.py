@@ -1,23 +1,16 @@
-"""What a vehicle's TOML file may hold (pydantic), and errors that name the key and the nearest valid one."""
+"""What a vehicle's TOML file may hold (pydantic)."""
 
 from __future__ import annotations
 
-import tomllib
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
-from .errors import DataError, suggestion
+from .toml_file import Name, NotNegative, Positive, Section, read_toml
 
-Positive = Annotated[float, Field(gt=0)]
-NotNegative = Annotated[float, Field(ge=0)]
-Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
-ExtraOutput = Literal["lateral_drift", "drift_rate", "dynamic_pressure_times_angle_of_attack"]
-
-
-class Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+ExtraOutput = Literal["lateral_drift", "drift_rate", "dynamic_pressure_times_angle_of_attack", "load_components"]
 
 
 class TableEntry(Section):
@@ -46,11 +39,44 @@ class TransferFunctionEntry(Section):
         return self
 
 
+class SensorFeedbackEntry(Section):
+    """Feedback of a load-relief sensor into the engine command.
+
+    ``modes`` holds displacement and slope of the bending modes at the sensor, ``schedule`` factors on the gain.
+    """
+
+    position_m: float
+    gain: float
+    filter: TransferFunctionEntry
+    modes: TableEntry | None = None
+    schedule: TableEntry | None = None
+    source: str = ""
+
+    @model_validator(mode="after")
+    def _strictly_proper(self):
+        if len(self.filter.numerator) >= len(self.filter.denominator):
+            raise ValueError(
+                "has a filter with as many zeros as poles: wind and engine angle would return to the engine command "
+                "without delay; add a pole, the sensor's bandwidth"
+            )
+        return self
+
+
 class ControlEntry(Section):
+    """Control law 4-4; ``accelerometer`` and ``angle_of_attack`` are load relief, absent in the report."""
+
     T1: TransferFunctionEntry
     T2: TransferFunctionEntry
     T3: TransferFunctionEntry
     gains: TableEntry
+    accelerometer: SensorFeedbackEntry | None = None
+    angle_of_attack: SensorFeedbackEntry | None = None
+
+    @property
+    def load_relief(self) -> dict[str, SensorFeedbackEntry]:
+        """Feedback of load-relief sensors by name; empty without any."""
+        entries = {"accelerometer": self.accelerometer, "angle_of_attack": self.angle_of_attack}
+        return {sensor: entry for sensor, entry in entries.items() if entry is not None}
 
 
 class BendingEntry(Section):
@@ -65,9 +91,13 @@ class SloshEntry(Section):
 
 
 class LoadEntry(Section):
+    """A bending moment. ``forward_of_gimbal_m`` is ``station_m`` from the gimbal plane; slosh_reaction needs it."""
+
     output: Name
     station_m: float
+    forward_of_gimbal_m: float | None = None
     table: TableEntry
+    local: TableEntry | None = None
 
 
 class NoiseEntry(Section):
@@ -148,6 +178,9 @@ class WindEntry(Section):
 
 class OptionsEntry(Section):
     full_coupling: bool = False
+    local_angle_of_attack: bool = False
+    slosh_reaction: bool = False
+    mean_response: Literal["linear", "nonlinear"] = "linear"
     extra_outputs: tuple[ExtraOutput, ...] = ()
 
 
@@ -156,6 +189,8 @@ class TablesEntry(Section):
     trajectory: TableEntry
     propulsion: TableEntry
     aerodynamics: TableEntry
+    local_aerodynamics: TableEntry | None = None
+    loads_along_vehicle: TableEntry | None = None
 
 
 class VehicleFile(Section):
@@ -180,49 +215,19 @@ class VehicleFile(Section):
     options: OptionsEntry = OptionsEntry()
 
 
-def read_vehicle_file(file: Path) -> VehicleFile:
+def read_vehicle_file(file: Path, changes: Mapping[str, Any] | None = None) -> VehicleFile:
     """Read and check a vehicle's TOML file.
+
+    Parameters
+    ----------
+    file : Path
+    changes : mapping, optional
+        Values to put in the place of the file's, by dotted key: ``{"options.full_coupling": True}``. Items of a list
+        count from 0 (``bending.0.damping``).
 
     Raises
     ------
     DataError
         The file, the key in it, what is wrong and the nearest valid key.
     """
-    try:
-        data = tomllib.loads(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise DataError(f"cannot be read ({error.strerror or error})", file=file) from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise DataError(f"is not valid TOML: {error}", file=file) from None
-    try:
-        return VehicleFile.model_validate(data)
-    except ValidationError as error:
-        first = error.errors()[0]
-        location = [str(part) for part in first["loc"]]
-        key = ".".join(location)
-        if first["type"] == "extra_forbidden":
-            section = _section(VehicleFile, location[:-1])
-            why = f"is not a key here{suggestion(location[-1], section)}"
-        elif first["type"] == "missing":
-            why = "is missing; add it"
-        else:
-            why = str(first["msg"]).removeprefix("Value error, ")
-            if not isinstance(first["input"], dict | list):
-                why += f" (found {first['input']!r})"
-        raise DataError(why, file=file, column=key) from None
-
-
-def _section(model: type[BaseModel], path: list[str]) -> list[str]:
-    """Return the keys allowed at a path of the file, following nested models."""
-    for part in path:
-        if part.isdigit() or part not in model.model_fields:
-            continue
-        annotation = model.model_fields[part].annotation
-        stack = [annotation]
-        while stack:
-            candidate = stack.pop()
-            if isinstance(candidate, type) and issubclass(candidate, BaseModel):
-                model = candidate
-                break
-            stack.extend(getattr(candidate, "__args__", ()))
-    return list(model.model_fields)
+    return read_toml(file, VehicleFile, changes)

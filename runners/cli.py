@@ -13,9 +13,13 @@ from rich.logging import RichHandler
 from rich.table import Table
 
 from ..model.errors import AscentwindError, AscentwindWarning
+from .cli_build import build_vehicle
 from .cli_checks import equations, sensitivity, tolerance, verify
+from .cli_design import design
+from .cli_mean import mean
+from .cli_study import study
 from .cli_wind import app as wind_app
-from .terminal import VehicleArgument, console, errors, progress_bar
+from .terminal import VehicleArgument, console, errors, parse_changes, progress_bar
 
 app = typer.Typer(
     add_completion=False,
@@ -24,8 +28,9 @@ app = typer.Typer(
     help="Response statistics of ascending launch vehicles in a random wind, by the method of adjoint systems.",
 )
 app.add_typer(wind_app, name="wind")
-for command in (verify, tolerance, sensitivity, equations):
+for command in (verify, tolerance, sensitivity, equations, study, mean, design):
     app.command()(command)
+app.command("build-vehicle")(build_vehicle)
 
 
 @app.command()
@@ -38,8 +43,17 @@ def run(
     ] = None,
     method: Annotated[str | None, typer.Option(help="CVODES formulas, adams or bdf; chooses cvodes.")] = None,
     tolerance: Annotated[float | None, typer.Option(help="Relative tolerance of the integration.")] = None,
+    changes: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="KEY=VALUE in the place of vehicle.toml's, e.g. options.full_coupling=true."),
+    ] = None,
+    along_vehicle: Annotated[
+        str | None,
+        typer.Option(help="Bending moment along the vehicle at this time (s, or 'peak'), and its envelope."),
+    ] = None,
 ) -> None:
     """Mean, variance and mean + 3 sigma of all responses over flight time: tables and figures."""
+    from .along_vehicle_output import prepare_along_vehicle, write_along_vehicle
     from .engines import engine_options
     from .figures import response_figure, weighting_figure, words, write_figure
     from .output import prepare_folder, write_statistics
@@ -50,9 +64,10 @@ def run(
     prepare_folder(folder)
     engine, options = engine_options(engine, method=method, relative_tolerance=tolerance)
     with console.status("loading and preparing code"):
-        study = Study.load(vehicle)
+        study = Study.load(vehicle, changes=parse_changes(changes or []))
     assert study.vehicle is not None
     end_times = parse_times(times or study.vehicle.file.default_times)
+    moment_time = None if along_vehicle is None else prepare_along_vehicle(study, along_vehicle)
     families = [t for t in study.vehicle.file.weighting_times_s if study.system.start < t <= study.system.end]
     with progress_bar() as progress:
         task = progress.add_task("end times", total=len(end_times))
@@ -79,6 +94,9 @@ def run(
             figure = weighting_figure(weighting, first.name, first.unit, title)
             written += write_figure(figure, folder, "weighting_functions")
         progress.advance(task)
+    if along_vehicle is not None:
+        with console.status("bending moment along the vehicle"):
+            written += write_along_vehicle(study, end_times, moment_time, folder)
     _print_peaks(statistics)
     top = study.vehicle.wind.mean.argument[-1]
     if study.tables(end_times[-1])["altitude"] > top:
@@ -95,7 +113,7 @@ def _print_peaks(statistics) -> None:
     for column in ("time", "mean + 3σ", "mean", "σ"):
         table.add_column(column, justify="right", no_wrap=True)
     for peak in found:
-        factor, unit = display(peak.unit)
+        factor, unit = display(peak.unit, peak.value)
         numbers = (f"{factor * x:.4g} {unit}" for x in (peak.value, peak.mean, peak.std))
         table.add_row(words(peak.response), f"{peak.time:g} s{'*' if peak.at_end else ''}", *numbers)
     console.print(table)
@@ -156,16 +174,20 @@ def inspect(
 
 @app.command()
 def regenerate(
-    vehicle: Annotated[str, typer.Argument(help="A shipped vehicle or a vehicle folder.")] = "as504",
-    out: Annotated[Path, typer.Option(help="Folder in which the vehicle gets a folder of its own.")] = Path(
+    vehicle: Annotated[
+        str | None, typer.Argument(help="A shipped vehicle or a vehicle folder; all shipped ones without it.")
+    ] = None,
+    out: Annotated[Path, typer.Option(help="Folder in which each vehicle gets a folder of its own.")] = Path(
         "generated"
     ),
 ) -> None:
     """Write the readable C of a vehicle and its manifest anew."""
+    from ..model.shipped import built_in_vehicles
     from .regenerate import regenerate as write
 
-    for path, state in write(vehicle, out).items():
-        console.print(f"{path}: {state}", soft_wrap=True)
+    for name in [vehicle] if vehicle else built_in_vehicles():
+        for path, state in write(name, out).items():
+            console.print(f"{path}: {state}", soft_wrap=True)
 
 
 @app.command()

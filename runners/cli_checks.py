@@ -69,7 +69,9 @@ def equations(
 
 def verify(
     vehicle: VehicleArgument,
-    times: Annotated[str, typer.Option(help="End times in s: START:STOP:STEP or T1,T2,...")] = "40,60,75,90",
+    times: Annotated[
+        str | None, typer.Option(help="End times in s: START:STOP:STEP or T1,T2,...; four of the vehicle's without it.")
+    ] = None,
     runs: Annotated[int, typer.Option(help="Simulated flights of the ensemble.")] = 500,
     seed: Annotated[int, typer.Option(help="Of the ensemble's noise.")] = 504,
     out: Annotated[Path | None, typer.Option(help="Folder for a figure of sample paths; none without it.")] = None,
@@ -79,7 +81,7 @@ def verify(
     from .figures import sample_path_figure, write_figure
     from .output import prepare_folder
     from .study import Study
-    from .times import parse_times
+    from .times import parse_times, spread_over
     from .verify import verify as run_verification
 
     options = EnsembleOptions(runs=runs, seed=seed, paths=min(30, runs) if out else 0)
@@ -87,7 +89,8 @@ def verify(
         prepare_folder(out)
     with console.status("loading and preparing code"):
         study = Study.load(vehicle)
-    end_times = parse_times(times)
+    assert study.vehicle is not None
+    end_times = parse_times(times) if times else spread_over(parse_times(study.vehicle.file.default_times), 4)
     with console.status("computing with every engine"):
         found = run_verification(study, end_times, options)
     _print_verification(found)
@@ -120,7 +123,7 @@ def _print_verification(found) -> None:
     table.add_column("inside")
     for k, time in enumerate(reference["time"].values):
         for r, response in enumerate(reference["response"].values):
-            factor, unit = display(str(reference["unit"].values[r]))
+            factor, unit = display(str(reference["unit"].values[r]), reference["std"].values[:, r])
             for s, source in enumerate(reference["source"].values):
                 low, high, std = (factor * ensemble[n].values[k, r, s] for n in ("std_low", "std_high", "std"))
                 table.add_row(
@@ -135,26 +138,32 @@ def _print_verification(found) -> None:
 
 def tolerance(
     vehicle: VehicleArgument,
-    times: Annotated[str, typer.Option(help="End times in s: START:STOP:STEP or T1,T2,...")] = "75",
+    times: Annotated[
+        str | None,
+        typer.Option(help="End times in s: START:STOP:STEP or T1,T2,...; greatest dynamic pressure without it."),
+    ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder for the figure; VEHICLE-tolerance without it.")] = None,
 ) -> None:
     """Error and run time of each engine against tolerance, and the variable that paces the step."""
     from .figures import tolerance_figure, write_figure
     from .output import prepare_folder
     from .study import Study
-    from .times import parse_times
+    from .times import parse_times, time_of_greatest_dynamic_pressure
     from .tolerance import TOLERANCES, measure, pacing
 
     folder = out or Path(f"{Path(vehicle).name}-tolerance")
     prepare_folder(folder)
-    end_times = parse_times(times)
+    end_times = parse_times(times) if times else []
     with console.status("loading and preparing code"):
         study = Study.load(vehicle)
+    assert study.vehicle is not None
+    end_times = end_times or [time_of_greatest_dynamic_pressure(study.vehicle)]
+    named = times or f"{end_times[0]:g}"
     with progress_bar() as progress:
         task = progress.add_task("tolerances", total=len(TOLERANCES))
         measured = measure(study, end_times, progress=lambda _: progress.update(task, advance=1))
     paces = pacing(study, max(end_times))
-    table = Table("engine", title=f"Largest relative error of a σ, and run time, end times {times} s")
+    table = Table("engine", title=f"Largest relative error of a σ, and run time, end times {named} s")
     for value in TOLERANCES:
         table.add_column(f"{value:.0e}", justify="right")
     for engine in dict.fromkeys(m.engine for m in measured):
@@ -173,7 +182,7 @@ def tolerance(
             f"{1e3 * pace.newton_step:.0f} ms", _root(pace.accuracy_root), pace.pacing_state,
         )  # fmt: skip
     console.print(table)
-    figure = tolerance_figure(measured, paces, f"{study.system.name}: end times {times} s")
+    figure = tolerance_figure(measured, paces, f"{study.system.name}: end times {named} s")
     for path in write_figure(figure, folder, "tolerance"):
         console.print(str(path), soft_wrap=True)
 

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from .terminal import console
+from .terminal import VehicleArgument, console
 
 app = typer.Typer(no_args_is_help=True, help="Wind statistics, and filters that turn white noise into that wind.")
 
@@ -75,7 +75,7 @@ def fit(
     time_limit: Annotated[float, typer.Option(help="Seconds.")] = 60.0,
     out: Annotated[Path, typer.Option(help="File for the filter.")] = Path("wind_filter.json"),
 ) -> None:
-    """Synthesise a filter and write it; [wind] of a vehicle takes it as filter = "FILE"."""
+    """Synthesise a filter and write it; \\[wind] of a vehicle takes it as filter = "FILE"."""
     from dataclasses import replace
 
     from ..model.wind_filter_file import filter_text
@@ -179,8 +179,8 @@ def plot(
 
 @app.command()
 def compare(
-    vehicle: Annotated[str, typer.Argument(help="A shipped vehicle or a vehicle folder.")] = "as504",
-    time: Annotated[float, typer.Option(help="End time, s.")] = 75.0,
+    vehicle: VehicleArgument,
+    time: Annotated[float | None, typer.Option(help="End time, s; greatest dynamic pressure without it.")] = None,
     response: Annotated[str, typer.Option(help="Response.")] = "bending_moment",
 ) -> None:
     """A response under different winds: months, editions, the closed form, and filters as poor as the report's."""
@@ -190,8 +190,12 @@ def compare(
     from .fit_progress import fit_progress
     from .least_squares import FitOptions
     from .study import Study
+    from .times import time_of_greatest_dynamic_pressure
     from .wind_comparison import CASES, REPORT_ERRORS, TOP, compare_winds, shipped_winds, stretched_to_error
 
+    study = Study.load(vehicle)
+    assert study.vehicle is not None
+    time = time_of_greatest_dynamic_pressure(study.vehicle) if time is None else time
     limit = FitOptions().time_limit
     with fit_progress(console, "fitting filters", limit * len(CASES)) as fitting:
         winds: dict = shipped_winds(FitOptions(progress=fitting))
@@ -202,7 +206,7 @@ def compare(
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     with Progress(*columns, console=console, transient=True) as bar:
         task = bar.add_task("responses", total=len(winds) + 1)
-        found = compare_winds(Study.load(vehicle), winds, time, response, progress=lambda: bar.advance(task))
+        found = compare_winds(study, winds, time, response, progress=lambda: bar.advance(task))
     table = Table(title=f"{response} at {time:g} s, wind alone")
     for column in ("wind", "mean", "σ", "variance against the first"):
         table.add_column(column, justify="left" if column == "wind" else "right")

@@ -41,11 +41,16 @@ class CovarianceOptions:
 
 @dataclass(frozen=True, eq=False)
 class CovarianceResult:
-    """Variances (k, responses, sources) and means (k, responses) at ``times``."""
+    """Covariances (k, sources, responses, responses) and means (k, responses) at ``times``."""
 
     times: NDArray[np.float64]
-    variance: NDArray[np.float64]
+    covariance: NDArray[np.float64]
     mean: NDArray[np.float64]
+
+    @property
+    def variance(self) -> NDArray[np.float64]:
+        """Variance by time, response and source, (k, responses, sources)."""
+        return np.einsum("ksrr->krs", self.covariance)
 
 
 def covariance_equation(
@@ -85,7 +90,7 @@ def covariance_equation(
     matrices = MatrixEvaluator(executable, ("A", "B", "E", "inputs"))
     outputs = MatrixEvaluator(executable, ("C", "G", "inputs"))
     y = np.concatenate([np.array(start).ravel(), np.zeros(n)])
-    variances, means = [], []
+    covariances, means = [], []
     begin = system.start
     for time in times:
         for interval in intervals(system, begin, float(time)) if time > begin else []:
@@ -112,8 +117,8 @@ def covariance_equation(
         last = intervals(system, system.start, begin)[-1]
         C, G, inputs = outputs(begin, last.low, last.high)
         C = C * scale
-        variances.append(np.einsum("ri,sij,rj->rs", C, y[:-n].reshape(len(sources), n, n), C))
+        covariances.append(C @ y[:-n].reshape(len(sources), n, n) @ C.T)
         means.append(C @ y[-n:] + G @ inputs[:, 0])
         if progress:
             progress(begin)
-    return CovarianceResult(np.asarray(times, float), np.array(variances), np.array(means))
+    return CovarianceResult(np.asarray(times, float), np.array(covariances), np.array(means))

@@ -161,14 +161,7 @@ def sweep_dataset(study: Study, found: SweepResult, responses: list[str], option
     }
     variance = found.variance[:, rows]
     dataset = statistics_dataset(study, found.times.tolist(), responses, found.mean[:, rows], variance, attributes)
-    covariance = found.covariance[:, :, rows][:, :, :, rows]
-    covariance = np.concatenate([covariance, covariance.sum(axis=1, keepdims=True)], axis=1)
-    dataset["covariance"] = (
-        ("time", "source", "response", "other_response"),
-        covariance,
-        {"units": "product of the units of the two responses", "long_name": "covariance between responses"},
-    )
-    dataset = dataset.assign_coords(other_response=list(responses))
+    dataset = _with_covariance(dataset, found.covariance, rows)
     error = np.moveaxis(found.error_estimate[:, :, rows], 1, 2)
     total = dataset["variance"].sel(source=COMBINED).values
     shared = (variance * error).sum(axis=2) / np.where(total > 0, total, 1.0)
@@ -178,6 +171,18 @@ def sweep_dataset(study: Study, found: SweepResult, responses: list[str], option
         {"units": "1", "long_name": "estimated relative error of the std"},
     )
     return dataset
+
+
+def _with_covariance(dataset: ResponseStatistics, covariance: np.ndarray, rows: list[int]) -> ResponseStatistics:
+    """Add the covariances between responses, of all outputs (k, sources, outputs, outputs) those in ``rows``."""
+    covariance = covariance[:, :, rows][:, :, :, rows]
+    covariance = np.concatenate([covariance, covariance.sum(axis=1, keepdims=True)], axis=1)
+    dataset["covariance"] = (
+        ("time", "source", "response", "other_response"),
+        covariance,
+        {"units": "product of the units of the two responses", "long_name": "covariance between responses"},
+    )
+    return dataset.assign_coords(other_response=dataset["response"].values)
 
 
 def batch_dataset(
@@ -197,7 +202,8 @@ def _covariance(
     rows = [study.system.output_index(name) for name in responses]
     found = covariance_equation(study.with_means, times, options.relative_tolerance, progress)
     attributes = provenance(study) | {"engine": "covariance", "relative_tolerance": options.relative_tolerance}
-    return statistics_dataset(study, times, responses, found.mean[:, rows], found.variance[:, rows], attributes)
+    dataset = statistics_dataset(study, times, responses, found.mean[:, rows], found.variance[:, rows], attributes)
+    return _with_covariance(dataset, found.covariance, rows)
 
 
 def _ensemble(

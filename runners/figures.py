@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -11,20 +12,22 @@ import xarray as xr
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
+from numpy.typing import ArrayLike
 
 from .output import write_whole
 from .statistics import COMBINED, ResponseStatistics
 from .tolerance import Measurement, Pace
 
-# what people read: label, factor from SI, unit
+# what people read: factor from SI, unit
 DISPLAY = {
-    "N m": (1e-6, "MN m"),
     "rad": (180 / np.pi, "deg"),
     "m": (1.0, "m"),
     "m/s": (1.0, "m/s"),
     "Pa rad": (1e-3 * 180 / np.pi, "kPa deg"),
     "1": (1.0, "1"),
 }
+MOMENTS = ((1e6, "MN m"), (1e3, "kN m"), (1.0, "N m"))  # the first that leaves the largest value at 1 or more
+TITLE_WIDTH = 76  # characters across a figure of 8 inches
 STYLE: dict[Any, Any] = {
     "figure.figsize": (8.0, 5.0),
     "figure.dpi": 110,
@@ -39,9 +42,18 @@ STYLE: dict[Any, Any] = {
 COLORS = {"mean": "#444444", "wind": "#1f6fb4", COMBINED: "#c8442c"}
 
 
-def display(unit: str) -> tuple[float, str]:
-    """Return the factor from SI and the unit in which a response is shown."""
+def display(unit: str, values: ArrayLike) -> tuple[float, str]:
+    """Return the factor from SI and the unit in which values of a response are shown."""
+    if unit == "N m":
+        largest = float(np.nanmax(np.abs(values)))
+        size, shown = next((m for m in MOMENTS if largest >= m[0]), MOMENTS[0])
+        return 1 / size, shown
     return DISPLAY.get(unit, (1.0, unit))
+
+
+def wrapped(title: str) -> str:
+    """Return a title with its long lines broken, so that they stay on the figure."""
+    return "\n".join(fill(line, TITLE_WIDTH) for line in title.splitlines())
 
 
 def words(name: str) -> str:
@@ -52,7 +64,7 @@ def words(name: str) -> str:
 def response_figure(statistics: ResponseStatistics, response: str, title: str) -> Figure:
     """Return mean, mean + 3 sigma from the first source alone, and from all, over flight time."""
     part = statistics.sel(response=response)
-    factor, unit = display(str(part["unit"].item()))
+    factor, unit = display(str(part["unit"].item()), part["mean_plus_3sigma"])
     first = str(statistics["source"].values[0])
     time = statistics["time"].values
     with rc_context(STYLE):
@@ -82,14 +94,14 @@ def response_figure(statistics: ResponseStatistics, response: str, title: str) -
         )
         axes.axhline(0, color="black", lw=0.6)
         axes.margins(y=0.12)
-        axes.set(xlabel="flight time (s)", ylabel=f"{words(response)} ({unit})", title=title)
+        axes.set(xlabel="flight time (s)", ylabel=f"{words(response)} ({unit})", title=wrapped(title))
         axes.legend()
     return figure
 
 
 def weighting_figure(families: Sequence[xr.Dataset], response: str, unit: str, title: str) -> Figure:
     """Return the weighting functions from the wind to one response for several end times t2."""
-    factor, shown = display(unit)
+    factor, shown = display(unit, [np.abs(f["input_weighting"].sel(response=response)).max() for f in families])
     latest = max(f.attrs["t2_s"] for f in families)
     first = max(min(float(f["t"].min()) for f in families), latest - 45)
     with rc_context(STYLE):
@@ -103,7 +115,7 @@ def weighting_figure(families: Sequence[xr.Dataset], response: str, unit: str, t
         panels[0, 0].set(xlim=(first, latest + 1))
         panels[-1, 0].set(xlabel="time of the wind impulse t (s)")
         figure.supylabel(f"g(t₂, t): {words(response)} at t₂ ({shown} per m/s · s)")
-        figure.suptitle(title)
+        figure.suptitle(wrapped(title))
     return figure
 
 
@@ -114,7 +126,9 @@ def sample_path_figure(ensemble: ResponseStatistics, statistics: ResponseStatist
         figure = Figure(figsize=(8.0, 2.6 * len(names) + 1.0), layout="constrained")
         panels = figure.subplots(len(names), sharex=True, squeeze=False)[:, 0]
         for name, axes in zip(names, panels, strict=True):
-            factor, unit = display(str(ensemble["unit"].sel(response=name).item()))
+            factor, unit = display(
+                str(ensemble["unit"].sel(response=name).item()), ensemble["sample_path"].sel(response=name)
+            )
             paths = factor * ensemble["sample_path"].sel(response=name).values
             axes.plot(ensemble["t"], paths.T, color="#7f8c9a", lw=0.5, alpha=0.7)
             part = statistics.sel(response=name, source=COMBINED)

@@ -55,6 +55,27 @@ def write_whole(path: Path, write: Callable[[Path], object]) -> Path:
     return path
 
 
+def write_bytes(path: Path, contents: bytes) -> Path:
+    """Write a file whole, and onto the disk before it takes its name.
+
+    Raises
+    ------
+    OutputFolderError
+        With the size that did not find room.
+    """
+
+    def write(temporary: Path) -> None:
+        with temporary.open("wb") as file:
+            file.write(contents)
+            file.flush()
+            os.fsync(file.fileno())
+
+    try:
+        return write_whole(path, write)
+    except OutputFolderError as error:
+        raise OutputFolderError(f"{error} ({len(contents)} bytes)") from None
+
+
 def write_statistics(statistics: ResponseStatistics, folder: Path) -> list[Path]:
     """Write statistics.nc (NetCDF) and statistics.csv (one row a time, response and source)."""
     text = statistics_csv(statistics)

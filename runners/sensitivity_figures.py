@@ -25,7 +25,7 @@ def heading(found: xr.Dataset) -> str:
     what = f"{LABELS[a['quantity']]} {words(a['response'])}{source} at {a['t2_s']:.4g} s"
     if a["quantity"] == "variance":
         return what
-    factor, unit = display(a["response_unit"])
+    factor, unit = display(a["response_unit"], a["value"])
     return f"{what}: {factor * a['value']:.4g} {unit}"
 
 

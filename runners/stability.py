@@ -65,11 +65,8 @@ def roots(executable: ExecutableSystem, time: float) -> list[Root]:
     return found
 
 
-def warn_if_unstable(executable: ExecutableSystem, end: float, checks: int = 12) -> None:
-    """Look for unstable roots at frozen times up to ``end`` and warn of the first.
-
-    Instability at frozen times does not make the statistics wrong; it makes them grow.
-    """
+def first_unstable(executable: ExecutableSystem, end: float, checks: int = 12) -> str | None:
+    """Look for unstable roots at frozen times up to ``end`` and describe the first, None without any."""
     system = executable.system
     begin = system.start
     for time in sorted({*np.linspace(begin, end, checks), *(i.begin for i in intervals(system, begin, end))}):
@@ -77,15 +74,23 @@ def warn_if_unstable(executable: ExecutableSystem, end: float, checks: int = 12)
         if np.linalg.eigvals(matrix).real.max() <= UNSTABLE:
             continue
         worst = max(roots(executable, float(time)), key=lambda r: r.value.real)
-        warnings.warn(
-            UnstableSystemWarning(
-                f"the system frozen at {time:.4g} s is unstable: root {worst.value.real:+.3g} "
-                f"{worst.value.imag:+.3g}j rad/s in {' and '.join(worst.states)}; the statistics asked for are given "
-                "and grow with it"
-            ),
-            stacklevel=3,
+        return (
+            f"the system frozen at {time:.4g} s is unstable: root {worst.value.real:+.3g} "
+            f"{worst.value.imag:+.3g}j rad/s in {' and '.join(worst.states)}"
         )
-        return
+    return None
+
+
+def warn_if_unstable(executable: ExecutableSystem, end: float) -> None:
+    """Warn of the first unstable root at frozen times up to ``end``.
+
+    Instability at frozen times does not make the statistics wrong; it makes them grow.
+    """
+    found = first_unstable(executable, end)
+    if found:
+        warnings.warn(
+            UnstableSystemWarning(f"{found}; the statistics asked for are given and grow with it"), stacklevel=3
+        )
 
 
 def check_coupling(executable: ExecutableSystem) -> None:

@@ -118,6 +118,7 @@ class Study(StudyNumbers):
         """
         if not parameter_sets:
             raise ParameterValueError("a batch needs at least one set of parameter values")
+        self._require_linear_mean("a batch")
         ends = sorted({float(t) for t in times})
         self._check_times(ends)
         options = options or SweepOptions(relative_tolerance=1e-4)
@@ -228,6 +229,7 @@ class Study(StudyNumbers):
         UndefinedElasticityWarning
             Parameters that are zero; their ``elasticity_defined`` is 0.
         """
+        self._require_linear_mean("a sensitivity")
         return sensitivity(self, response, time, source, quantity, parameters, elasticity)
 
     def sensitivities(
@@ -321,4 +323,5 @@ class Study(StudyNumbers):
             Over (item): ``derivative``, ``difference``, its ``uncertainty``, how far they are ``apart`` and whether
             the sensitivity ``agrees`` to 1e-5 and the uncertainty.
         """
+        self._require_linear_mean("a sensitivity")
         return check_sensitivity(self, response, time, source, quantity, parameters, rows)

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ from ..model.vehicle import Vehicle, load_vehicle
 from ..model.wind_filter import ShapingFilter
 from ..model.wind_statistics import WindModel
 from .mean_response import with_mean_tables
+from .planar_mean import with_nonlinear_mean
 from .stability import Root, check_coupling, matrices_at, roots
 from .sweep_engine import sweep_of, with_sweep_mean_tables
 from .wind_range import warn_beyond
@@ -44,7 +45,7 @@ class StudyNumbers:
     vehicle: Vehicle | None = None
 
     @classmethod
-    def load(cls, vehicle: str | Path, *, compile: bool = True) -> Self:
+    def load(cls, vehicle: str | Path, *, compile: bool = True, changes: Mapping[str, Any] | None = None) -> Self:
         """Load a shipped vehicle by name, or a vehicle folder.
 
         Parameters
@@ -52,12 +53,15 @@ class StudyNumbers:
         vehicle : str or path
         compile : bool
             False uses CasADi's interpreter: the same numbers, slower.
+        changes : mapping, optional
+            Values in the place of those in vehicle.toml, by dotted key: ``{"options.full_coupling": True}``. They may
+            change the structure, which ``with_parameters`` cannot.
 
         Raises
         ------
         UnknownNameError, DataError, SingularCouplingError, CompilerError
         """
-        return cls.from_vehicle(load_vehicle(find_vehicle(vehicle)), compile=compile)
+        return cls.from_vehicle(load_vehicle(find_vehicle(vehicle), changes), compile=compile)
 
     @classmethod
     def from_vehicle(cls, vehicle: Vehicle, *, compile: bool = True) -> Self:
@@ -134,11 +138,18 @@ class StudyNumbers:
         return study.with_parameters(values)
 
     @cached_property
-    def with_means(self) -> ExecutableSystem:
-        """The system with its tables of the mean response, which the noise coefficients need, filled in."""
+    def linear_means(self) -> ExecutableSystem:
+        """The system with its tables of the mean response filled in by the linear mean."""
         if self.executable.shared_library is None:
             return with_mean_tables(self.executable)
         return with_sweep_mean_tables(sweep_of(self.system), self.executable)
+
+    @cached_property
+    def with_means(self) -> ExecutableSystem:
+        """The system with the tables of the mean response that the noise coefficients need, as the options ask."""
+        if self.vehicle is not None and self.vehicle.file.options.mean_response == "nonlinear":
+            return with_nonlinear_mean(self.vehicle, self.linear_means)
+        return self.linear_means
 
     def matrices(self, time: float) -> tuple[NDArray, NDArray, NDArray, NDArray]:
         """Return A (n, n), B (n, n_w), C (n_y, n), D (n_y, n_w) at a time; names are in ``study.system``."""
@@ -155,6 +166,10 @@ class StudyNumbers:
         """Return every table value at a time (s) by name."""
         self._check_times([time])
         return table_values(self.with_means.groups, float(time))
+
+    def _require_linear_mean(self, what: str) -> None:
+        if self.vehicle is not None and self.vehicle.file.options.mean_response == "nonlinear":
+            raise ParameterValueError(f'{what} follows the linear mean response; set options.mean_response = "linear"')
 
     def _check_spacing(self, spacing: float) -> None:
         if not spacing > 0:

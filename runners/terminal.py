@@ -1,17 +1,41 @@
-"""What the command-line modules share: consoles, the vehicle argument and progress bars."""
+"""What the command-line modules share: consoles, the vehicle argument, changes to it, and progress bars."""
 
 from __future__ import annotations
 
-from typing import Annotated
+import tomllib
+from collections.abc import Sequence
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
+from ..model.errors import DataError
+
 console = Console()
 errors = Console(stderr=True)
 
 VehicleArgument = Annotated[str, typer.Argument(help="A shipped vehicle ('ascentwind vehicles') or a vehicle folder.")]
+
+
+def parse_changes(texts: Sequence[str]) -> dict[str, Any]:
+    """Return changes to a vehicle's file from 'KEY=VALUE' with a dotted key and a TOML value.
+
+    Raises
+    ------
+    DataError
+        With the form expected.
+    """
+    changes: dict[str, Any] = {}
+    for text in texts:
+        key, equals, value = text.partition("=")
+        if not equals or not key.strip():
+            raise DataError(f"'{text}' changes nothing; write KEY=VALUE, such as options.full_coupling=true")
+        try:
+            changes[key.strip()] = tomllib.loads(f"value = {value}")["value"]
+        except tomllib.TOMLDecodeError:
+            raise DataError(f"'{value}' is not a TOML value; text needs quotes, true and numbers none") from None
+    return changes
 
 
 def progress_bar() -> Progress:

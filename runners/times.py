@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
 
 from ..model.errors import TimeRangeError
+from ..model.vehicle import Vehicle
 
 MOST = 100_000
 
@@ -33,6 +35,17 @@ def parse_times(text: str) -> list[float]:
     if (stop - start) / step > MOST:
         raise TimeRangeError(f"'{text}' names more than {MOST} times; take a larger step")
     return [float(t) for t in start + step * np.arange(int(np.floor((stop - start) / step + 1e-9)) + 1)]
+
+
+def spread_over(times: Sequence[float], count: int) -> list[float]:
+    """Return at most ``count`` of the times, evenly spread, the first and the last among them."""
+    return [times[i] for i in np.unique(np.linspace(0, len(times) - 1, count).round().astype(int))]
+
+
+def time_of_greatest_dynamic_pressure(vehicle: Vehicle) -> float:
+    """Return the time (s) of the row with the greatest dynamic pressure."""
+    table = vehicle.tables["dynamic_pressure"]
+    return float(table.argument[int(np.argmax(table.values))])
 
 
 def parse_time_or_peak(text: str) -> float | Literal["peak"]:

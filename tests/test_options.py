@@ -33,6 +33,16 @@ def test_full_coupling_has_one_symmetric_positive_mass_matrix(edit, as504):
     assert 1e-4 < abs(change) < 0.2
 
 
+def test_changes_are_as_if_the_file_had_been_edited(edit):
+    """Study.load(changes=...) is the edited file, for a nested key and an item of a list."""
+    edit("full_coupling = false", "full_coupling = true")
+    edited = Study.load(edit("[[bending]]\ndamping = 0.005", "[[bending]]\ndamping = 0.02"), compile=False)
+    changes = {"options.full_coupling": True, "bending.0.damping": 0.02, "bending.1.damping": 0.02}
+    changed = Study.load("as504", compile=False, changes=changes)
+    np.testing.assert_array_equal(changed.matrices(60.0)[0], edited.matrices(60.0)[0])
+    assert changed.parameters["bending.1.damping"].value == 0.02
+
+
 def test_extra_outputs_are_what_their_names_say(edit, as504):
     extra = '"lateral_drift", "drift_rate", "dynamic_pressure_times_angle_of_attack"'
     study = Study.load(edit("extra_outputs = []", f"extra_outputs = [{extra}]"))

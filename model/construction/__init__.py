@@ -1,0 +1,3 @@
+"""What a vehicle is built of: masses, tanks, stiffness, aerodynamics, engines, programme, site."""
+
+from .construction import Construction as Construction

@@ -1,0 +1,100 @@
+"""Everything a vehicle is built of, checked as a whole."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from ..errors import DataError, UnknownNameError
+from .flight import AtmosphereFactors, Drag, EngineGroup, NormalForceComponent, PitchProgramme, Site
+from .structure import LumpedMass, Stiffness, Tank
+from .tank_shape import TankShape
+
+
+@dataclass(frozen=True, eq=False)
+class Construction:
+    """The raw inputs of a vehicle; stations in metres, forward positive.
+
+    Attributes
+    ----------
+    name : str
+    gimbal_station, sensor_station : float
+        Engine gimbal plane; attitude and rate sensors (m). Tables count metres forward of the gimbal plane.
+    aft_end, forward_end : float
+        Ends of the vehicle (m): masses, liquid and beam lie between them.
+    reference_area : float
+        m2.
+    masses : tuple of LumpedMass
+        Everything but the liquid in ``tanks``.
+    tanks : tuple of Tank
+    stiffness : Stiffness
+    bending_modes : int
+        How many modes the model has.
+    normal_force : tuple of NormalForceComponent
+    drag : Drag
+    engines : tuple of EngineGroup
+    pitch : PitchProgramme
+    site : Site
+    atmosphere : AtmosphereFactors or None
+        None: the 1976 standard atmosphere itself.
+    load_stations : tuple of float
+        Stations whose bending moment is an output (m).
+    end_time : float
+        Latest end of the tables (s); the flight may end before at depletion.
+    slosh_method : {'surface_radius', 'cylinder', 'potential'}
+        Cylinder formulas with the radius of the free surface at the liquid's level, or with the tank's largest radius;
+        or the first mode of potential flow in the tank's own shape.
+    """
+
+    name: str
+    gimbal_station: float
+    sensor_station: float
+    aft_end: float
+    forward_end: float
+    reference_area: float
+    masses: tuple[LumpedMass, ...]
+    tanks: tuple[Tank, ...]
+    stiffness: Stiffness
+    bending_modes: int
+    normal_force: tuple[NormalForceComponent, ...]
+    drag: Drag
+    engines: tuple[EngineGroup, ...]
+    pitch: PitchProgramme
+    site: Site
+    atmosphere: AtmosphereFactors | None
+    load_stations: tuple[float, ...]
+    end_time: float
+    slosh_method: Literal["surface_radius", "cylinder", "potential"] = "surface_radius"
+
+    def __post_init__(self):
+        for mass in self.masses:
+            mass.require_within(self.aft_end, self.forward_end)
+        for tank in self.tanks:
+            if tank.bottom < self.aft_end or tank.top > self.forward_end:
+                raise DataError(f"tank '{tank.name}' lies beyond the vehicle's ends; correct its sections")
+            capacity = TankShape.of(tank).capacity
+            if tank.liquid > tank.density * capacity:
+                raise DataError(
+                    f"tank '{tank.name}' is overfilled: {tank.liquid:g} kg at {tank.density:g} kg/m3 take "
+                    f"{tank.liquid / tank.density:.4g} m3 of {capacity:.4g} m3; correct liquid, density or sections"
+                )
+        ends = self.stiffness.station[[0, -1]]
+        if ends[0] > self.aft_end or ends[1] < self.forward_end:
+            raise DataError(
+                f"stiffness is given from {ends[0]:g} to {ends[1]:g} m, the vehicle reaches from {self.aft_end:g} to "
+                f"{self.forward_end:g} m; add stations"
+            )
+        names = [tank.name for tank in self.tanks]
+        for group in self.engines:
+            for tank in (*group.draws, *group.residual):
+                if tank not in names:
+                    raise UnknownNameError("tank", tank, names)
+        for station in self.load_stations:
+            if not self.aft_end < station < self.forward_end:
+                raise DataError(f"load station {station:g} m is not on the vehicle; choose one between its ends")
+        if not self.engines:
+            raise DataError("the vehicle has no engines; add [[engines]]")
+
+    def forward_of_gimbal(self, station: float) -> float:
+        """Return metres forward of the gimbal plane."""
+        return station - self.gimbal_station

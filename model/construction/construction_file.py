@@ -1,0 +1,251 @@
+"""Reading what a vehicle is built of: construction.toml and the CSV files that it names."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, get_args
+
+import numpy as np
+
+from ..csv_table import CsvTable, Order, read_csv_table
+from ..errors import DataError
+from ..toml_file import read_toml
+from .construction import Construction
+from .construction_entries import (
+    ConstructionFile,
+    EngineEntry,
+    NormalForceEntry,
+    PitchEntry,
+    SiteEntry,
+    Status,
+    TankEntry,
+)
+from .flight import AtmosphereFactors, Drag, EngineGroup, NormalForceComponent, PitchProgramme, Site
+from .structure import LumpedMass, Stiffness, Tank, TankSection
+
+CONSTRUCTION_FILE = "construction.toml"
+_ORIGIN = ("status", "source")
+_POLYNOMIAL = (
+    ("begin", "s"),
+    ("end", "s"),
+    ("constant", "deg"),
+    ("linear", "deg/s"),
+    ("quadratic", "deg/s2"),
+    ("cubic", "deg/s3"),
+    ("quartic", "deg/s4"),
+)
+
+
+def load_construction(folder: Path, changes: Mapping[str, Any] | None = None) -> Construction:
+    """Read the raw inputs of a vehicle.
+
+    Parameters
+    ----------
+    folder : Path
+        Vehicle folder; docs/construction.md describes its construction.toml.
+    changes : mapping, optional
+        Values to put in the place of the file's, by dotted key; see ``read_toml``.
+
+    Raises
+    ------
+    DataError
+        File, key or column, and row of what cannot be used, and what to do.
+    UnknownNameError
+        An engine draws from a tank that is not there.
+    """
+    toml = folder / CONSTRUCTION_FILE
+    entry = read_toml(toml, ConstructionFile, changes)
+    masses = _masses(folder / entry.masses.file, entry.aft_end_m, entry.forward_end_m)
+    stiffness = _stiffness(folder / entry.stiffness.file)
+    drag = _drag(folder / entry.drag.file)
+    atmosphere = None if entry.atmosphere is None else _atmosphere(folder / entry.atmosphere.file)
+    engines = tuple(_engine(folder, e) for e in entry.engines)
+    normal_force = tuple(_normal_force(folder, e) for e in entry.normal_force)
+    pitch = _pitch(folder / entry.pitch.file, entry.pitch)
+    tanks = []
+    for tank in entry.tanks:
+        with _located(toml, f"tanks.{tank.name}"):
+            tanks.append(_tank(tank))
+    with _located(toml):
+        return Construction(
+            name=entry.name,
+            gimbal_station=entry.gimbal_station_m,
+            sensor_station=entry.sensor_station_m,
+            aft_end=entry.aft_end_m,
+            forward_end=entry.forward_end_m,
+            reference_area=entry.reference_area_m2,
+            masses=masses,
+            tanks=tuple(tanks),
+            stiffness=stiffness,
+            bending_modes=entry.bending_modes,
+            normal_force=normal_force,
+            drag=drag,
+            engines=engines,
+            pitch=pitch,
+            site=_site(entry.site),
+            atmosphere=atmosphere,
+            load_stations=entry.load_stations_m,
+            end_time=entry.end_time_s,
+            slosh_method=entry.slosh_method,
+        )
+
+
+def construction_files(folder: Path) -> tuple[Path, ...]:
+    """Return construction.toml and every file that it names, in its order, each once."""
+    toml = folder / CONSTRUCTION_FILE
+    entry = read_toml(toml, ConstructionFile)
+    parts = (entry.masses, entry.stiffness, entry.drag, entry.atmosphere, entry.pitch)
+    names = [p.file for p in (*parts, *entry.engines, *entry.normal_force) if p is not None]
+    return (toml, *(folder / name for name in dict.fromkeys(names)))
+
+
+@contextmanager
+def _located(file: Path, column: str | None = None, row: int | None = None) -> Iterator[None]:
+    """Add file, key and row to the errors of the data classes."""
+    try:
+        yield
+    except DataError as error:
+        if error.file is not None:
+            raise
+        raise DataError(error.why, file=file, column=column, row=row) from None
+
+
+def _read(
+    file: Path, argument: str, unit: str, order: Order = "increasing", text: tuple[str, ...] = _ORIGIN
+) -> CsvTable:
+    table = read_csv_table(file, argument, unit, order=order, text=text)
+    for status, line in zip(table.text["status"], table.lines, strict=True):
+        if status not in get_args(Status):
+            raise DataError(
+                f"'{status}' is not a status; write one of {', '.join(get_args(Status))}",
+                file=file,
+                column="status",
+                row=line,
+            )
+    return table
+
+
+def _masses(file: Path, aft_end: float, forward_end: float) -> tuple[LumpedMass, ...]:
+    table = _read(file, "begin", "m", "any", ("item", *_ORIGIN))
+    columns = zip(
+        table.text["item"],
+        table.column("begin", "m"),
+        table.column("end", "m"),
+        table.column("mass", "kg"),
+        table.column("radius_of_gyration", "m"),
+        strict=True,
+    )
+    masses = []
+    for line, (item, begin, end, mass, radius) in zip(table.lines, columns, strict=True):
+        with _located(file, row=line):
+            masses.append(LumpedMass(item, float(begin), float(end), float(mass), float(radius)))
+            masses[-1].require_within(aft_end, forward_end)
+    return tuple(masses)
+
+
+def _stiffness(file: Path) -> Stiffness:
+    table = _read(file, "station", "m", "not decreasing", ("item", *_ORIGIN))
+    bending, shear = table.column("bending", "N m2"), table.column("shear", "N")
+    for column in ("bending", "shear"):
+        table.require_positive(column)
+    with _located(file):
+        return Stiffness(table.columns["station"], bending, shear)
+
+
+def _drag(file: Path) -> Drag:
+    table = _read(file, "mach", "1")
+    table.column("coefficient", "1")
+    table.require_positive("coefficient", allow_zero=True)
+    return Drag(table.columns["mach"], table.columns["coefficient"])
+
+
+def _atmosphere(file: Path) -> AtmosphereFactors:
+    table = _read(file, "altitude", "m")
+    density, temperature = table.column("density_factor", "1"), table.column("temperature_factor", "1")
+    for column in ("density_factor", "temperature_factor"):
+        table.require_positive(column)
+    return AtmosphereFactors(table.columns["altitude"], density, temperature)
+
+
+def _engine(folder: Path, entry: EngineEntry) -> EngineGroup:
+    table = _read(folder / entry.file, "time", "s")
+    thrust, flow = table.column("vacuum_thrust", "N"), table.column("mass_flow", "kg/s")
+    for column in ("vacuum_thrust", "mass_flow"):
+        table.require_positive(column)
+    with _located(folder / CONSTRUCTION_FILE, f"engines.{entry.name}"):
+        return EngineGroup(
+            name=entry.name,
+            count=entry.count,
+            gimballed=entry.gimballed,
+            exit_area=entry.exit_area_m2,
+            time=table.columns["time"],
+            vacuum_thrust=thrust,
+            mass_flow=flow,
+            draws=entry.draws,
+            cutoff=entry.cutoff_s,
+            cutoff_event=entry.cutoff_event,
+            residual=entry.residual_kg,
+        )
+
+
+def _normal_force(folder: Path, entry: NormalForceEntry) -> NormalForceComponent:
+    table = _read(folder / entry.file, "mach", "1")
+    slope = table.column(entry.name, "1/rad")
+    with _located(folder / CONSTRUCTION_FILE, f"normal_force.{entry.name}"):
+        return NormalForceComponent(
+            entry.name, np.array(entry.station_m), np.array(entry.shape), table.columns["mach"], slope
+        )
+
+
+def _pitch(file: Path, entry: PitchEntry) -> PitchProgramme:
+    none = np.zeros(0)
+    segments, time, angle = np.zeros((0, 7)), none, none
+    if entry.kind == "polynomials":
+        table = _read(file, "begin", "s")
+        columns = [table.column(name, unit) for name, unit in _POLYNOMIAL]
+        segments = np.column_stack([*columns[:2], *(np.radians(c) for c in columns[2:])])
+        gap = np.flatnonzero(segments[1:, 0] != segments[:-1, 1])
+        if gap.size:
+            raise DataError(
+                f"begins at {segments[gap[0] + 1, 0]:g} s where the row above ends at {segments[gap[0], 1]:g} s; "
+                "let segments follow each other",
+                file=file,
+                column="begin",
+                row=table.lines[gap[0] + 1],
+            )
+    else:
+        table = _read(file, "time", "s")
+        time, angle = table.columns["time"], np.radians(table.column("pitch", "deg"))
+    arrest = math.inf if entry.arrest_s is None else entry.arrest_s
+    return PitchProgramme(entry.kind, entry.time_base_s, entry.begin_s, arrest, segments, time, angle)
+
+
+def _site(entry: SiteEntry) -> Site:
+    return Site(
+        math.radians(entry.latitude_deg),
+        math.radians(entry.azimuth_deg),
+        entry.altitude_m,
+        entry.platform_release_s,
+        entry.release_s,
+    )
+
+
+def _tank(entry: TankEntry) -> Tank:
+    sections = tuple(
+        TankSection(
+            kind=s.kind,
+            begin=s.begin_m,
+            end=s.end_m,
+            radius=s.radius_m,
+            end_radius=0.0 if s.end_radius_m is None else s.end_radius_m,
+            center=0.0 if s.center_m is None else s.center_m,
+            semi_axis=1.0 if s.semi_axis_m is None else s.semi_axis_m,
+            sign=s.sign,
+            count=s.count,
+        )
+        for s in entry.sections
+    )
+    return Tank(entry.name, sections, entry.density_kg_m3, entry.liquid_kg, entry.sloshes)

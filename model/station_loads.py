@@ -1,0 +1,98 @@
+"""Load coefficients along the whole vehicle: a table of stations by times."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .csv_table import read_csv_table
+from .errors import DataError
+from .loads import REACTION_COLUMNS, load_columns
+from .local_aerodynamics import local_load_columns
+from .tables import Table
+from .vehicle import Vehicle
+
+KEY = "loads_along_vehicle"
+ARGUMENTS = (("time", "s", ""), ("station", "m", ""), ("forward_of_gimbal", "m", ""))
+
+
+@dataclass(frozen=True, eq=False)
+class StationLoads:
+    """Coefficients of the bending moment at stations.
+
+    Attributes
+    ----------
+    station, forward_of_gimbal : (s,) arrays
+        Vehicle station and metres forward of the gimbal plane (m).
+    tables : dict of str to tuple of Table
+        By column of a load's table, one table over time for each station.
+    """
+
+    station: NDArray[np.float64]
+    forward_of_gimbal: NDArray[np.float64]
+    tables: dict[str, tuple[Table, ...]]
+
+    def at(self, times: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+        """Return every column at times, (times, s).
+
+        Raises
+        ------
+        DataError
+            For a time that the table does not cover.
+        """
+        first = next(iter(self.tables.values()))[0].argument
+        for time in times:
+            if not first[0] <= time <= first[-1]:
+                raise DataError(
+                    f"t = {time:g} s lies outside of the loads along the vehicle, {first[0]:g} to {first[-1]:g} s; "
+                    "build the vehicle for it"
+                )
+        return {name: np.array([table.polynomial(times) for table in tables]).T for name, tables in self.tables.items()}
+
+
+def along_columns(modes: int, tanks: list[str]) -> tuple[tuple[str, str, str], ...]:
+    """Return the coefficient columns of the table: name, unit, sign."""
+    return (*load_columns(modes, tanks), *REACTION_COLUMNS, *local_load_columns(modes))
+
+
+def load_station_loads(vehicle: Vehicle) -> StationLoads:
+    """Read the table that a vehicle names as ``tables.loads_along_vehicle``.
+
+    Raises
+    ------
+    DataError
+        If there is none, if a column is missing, or if the stations differ from time to time.
+    """
+    entry = vehicle.file.tables.loads_along_vehicle
+    if entry is None:
+        raise DataError(
+            "is missing, but the bending moment along the vehicle needs it; 'ascentwind build-vehicle' makes it",
+            file=vehicle.folder / "vehicle.toml",
+            column=f"tables.{KEY}",
+        )
+    file: Path = vehicle.folder / entry.file
+    csv = read_csv_table(file, "time", "s", order="not decreasing")
+    columns = along_columns(len(vehicle.bending), [tank.name for tank in vehicle.slosh])
+    for name, unit, _ in (*ARGUMENTS, *columns):
+        csv.column(name, unit)
+    time, station = csv.columns["time"], csv.columns["station"]
+    times, stations = np.unique(time), np.unique(station)
+    shape = times.size, stations.size
+    order = np.lexsort((station, time))
+    if order.size != times.size * stations.size or (station[order].reshape(shape) != stations).any():
+        raise DataError(
+            f"has {order.size} rows for {times.size} times and {stations.size} stations; give every station once at "
+            "every time",
+            file=file,
+        )
+    breaks = tuple(sorted(vehicle.file.events[event] for event in entry.events if event in vehicle.file.events))
+
+    def tables(name: str, unit: str) -> tuple[Table, ...]:
+        values = csv.columns[name][order].reshape(shape)
+        return tuple(Table(name, unit, times, row, entry.interpolation, breaks) for row in values.T)
+
+    forward = csv.columns["forward_of_gimbal"][order].reshape(shape)[0]
+    return StationLoads(stations, forward, {name: tables(name, unit) for name, unit, _ in columns})

@@ -1,0 +1,118 @@
+"""Reading a TOML file into a checked pydantic model, with errors that name the key and the nearest valid one."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from .errors import DataError, suggestion
+
+Positive = Annotated[float, Field(gt=0)]
+NotNegative = Annotated[float, Field(ge=0)]
+Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
+
+
+class Section(BaseModel):
+    """A table of a TOML file: unknown keys are refused."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+File = TypeVar("File", bound=Section)
+
+
+def read_toml(file: Path, model: type[File], changes: Mapping[str, Any] | None = None) -> File:
+    """Read and check a TOML file.
+
+    Parameters
+    ----------
+    file : Path
+    model : type
+        Its pydantic model.
+    changes : mapping, optional
+        Values to put in the place of the file's, by dotted key; items of a list count from 0.
+
+    Raises
+    ------
+    DataError
+        The file, the key in it, what is wrong and the nearest valid key.
+    """
+    try:
+        data = tomllib.loads(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise DataError(f"cannot be read ({error.strerror or error})", file=file) from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise DataError(f"is not valid TOML: {error}", file=file) from None
+    for dotted, value in (changes or {}).items():
+        _put(data, dotted, value, file)
+    return validated(data, model, file)
+
+
+def validated(data: Mapping[str, Any], model: type[File], file: Path | None = None) -> File:
+    """Check the contents of a TOML file.
+
+    Raises
+    ------
+    DataError
+    """
+    try:
+        return model.model_validate(data)
+    except ValidationError as error:
+        errors = error.errors()
+        # a misspelt key is missing too; its spelling helps more
+        first = next((e for e in errors if e["type"] == "extra_forbidden"), errors[0])
+        location = [str(part) for part in first["loc"]]
+        if first["type"] == "extra_forbidden":
+            why = f"is not a key here{suggestion(location[-1], _keys_at(model, location[:-1]))}"
+        elif first["type"] == "missing":
+            why = "is missing; add it"
+        else:
+            why = str(first["msg"]).removeprefix("Value error, ")
+            if not isinstance(first["input"], dict | list):
+                why += f" (found {first['input']!r})"
+        raise DataError(why, file=file, column=".".join(location) or None) from None
+
+
+def _put(data: dict[str, Any], dotted: str, value: Any, file: Path) -> None:
+    """Set a value by dotted key; sections that are missing are made, and checked with the rest."""
+    *path, last = dotted.split(".")
+    inner: Any = data
+    for part in path:
+        inner = _item(inner, part, dotted, file) if isinstance(inner, list) else inner.setdefault(part, {})
+        if not isinstance(inner, dict | list):
+            raise DataError(f"has no key '{last}': it is a value, not a section", file=file, column=dotted)
+    if isinstance(inner, list):
+        _item(inner, last, dotted, file)
+        inner[int(last)] = value
+    else:
+        inner[last] = value
+
+
+def _item(items: list[Any], index: str, dotted: str, file: Path) -> Any:
+    if not index.isdigit() or int(index) >= len(items):
+        raise DataError(
+            f"'{index}' is not an item of a list of {len(items)}; count from 0 to {len(items) - 1}",
+            file=file,
+            column=dotted,
+        )
+    return items[int(index)]
+
+
+def _keys_at(model: type[BaseModel], path: list[str]) -> list[str]:
+    """Return the keys allowed at a path of the file, following nested models."""
+    for part in path:
+        if part.isdigit() or part not in model.model_fields:
+            continue
+        annotation = model.model_fields[part].annotation
+        stack = [annotation]
+        while stack:
+            candidate = stack.pop()
+            if isinstance(candidate, type) and issubclass(candidate, BaseModel):
+                model = candidate
+                break
+            stack.extend(getattr(candidate, "__args__", ()))
+    return list(model.model_fields)

@@ -1,0 +1,1 @@
+"""From construction to tables: mean flight, mass properties, beam modes, slosh, aerodynamics, loads."""

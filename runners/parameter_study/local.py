@@ -1,0 +1,26 @@
+"""Chunks on the cores of this machine, by threads: the generated sweep runs without Python's lock."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterable
+from concurrent.futures import ThreadPoolExecutor, as_completed
+
+from ..cores import available_cores
+from ..study import Study
+from .compute import Chunk, ChunkResult, Task, compute_chunk
+
+
+def compute_locally(
+    study: Study, task: Task, missing: Iterable[Chunk]
+) -> Generator[tuple[Chunk, ChunkResult], None, None]:
+    """Yield chunks as they are done, in any order.
+
+    When the caller stops, those not yet begun are dropped.
+    """
+    pool = ThreadPoolExecutor(available_cores())
+    try:
+        running = {pool.submit(compute_chunk, study, task, chunk): chunk for chunk in missing}
+        for future in as_completed(running):
+            yield running.pop(future), future.result()
+    finally:
+        pool.shutdown(cancel_futures=True)

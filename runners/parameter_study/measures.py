@@ -1,0 +1,57 @@
+"""What is asked of every member: peaks of mean + 3 sigma, and the statistics at the time of the nominal peak."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+
+from ..statistics import COMBINED
+from .run import ParameterStudy
+
+PEAK = "peak"
+MEASURES = (PEAK, "mean_plus_3sigma", "mean", "std")
+LABELS = {PEAK: "peak of mean + 3σ", "mean_plus_3sigma": "mean + 3σ", "mean": "mean", "std": "σ"}
+
+
+def measures(result: ParameterStudy) -> xr.Dataset:
+    """Return the measures of the members that have numbers, and of the nominal study.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``sample`` (measure, response, computed_member) and ``nominal`` (measure, response), SI; ``peak_time``
+        (response), the end time of the nominal peak, at which all measures but 'peak' are taken; ``member_peak_time``
+        (response, computed_member); the coordinate ``member`` is the number of a member in the study.
+    """
+    data, kept = result.data, result.computed
+    mean, std = (data[name].values[kept] for name in ("mean", "std"))
+    std = std[..., data["source"].values.tolist().index(COMBINED)]
+    nominal_mean, nominal_std = data["nominal_mean"].values, data["nominal_std"].sel(source=COMBINED).values
+    at = np.argmax(nominal_mean + 3 * nominal_std, axis=0)
+    responses = np.arange(at.size)
+    samples = _measures(mean, std, at)
+    return xr.Dataset(
+        {
+            "sample": (("measure", "response", "computed_member"), np.moveaxis(samples, 0, -1)),
+            "nominal": (("measure", "response"), _measures(nominal_mean[None], nominal_std[None], at)[0]),
+            "peak_time": ("response", data["time"].values[at], {"units": "s"}),
+            "member_peak_time": (
+                ("response", "computed_member"),
+                data["time"].values[np.argmax(mean + 3 * std, axis=1)].T.reshape(responses.size, -1),
+                {"units": "s"},
+            ),
+        },
+        {
+            "measure": list(MEASURES),
+            "response": data["response"],
+            "unit": data["unit"],
+            "member": ("computed_member", np.flatnonzero(kept)),
+        },
+    )
+
+
+def _measures(mean: np.ndarray, std: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Return (members, measures, responses) from (members, times, responses)."""
+    upper = mean + 3 * std
+    chosen = (x[:, at, np.arange(at.size)] for x in (upper, mean, std))
+    return np.stack([upper.max(axis=1), *chosen], axis=1)

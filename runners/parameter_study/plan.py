@@ -1,0 +1,192 @@
+"""What a parameter study's TOML file may hold: a grid, one parameter at a time, or a dispersion."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from ...model.errors import DataError
+from ...model.toml_file import Section, read_toml, validated
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+QuantityName = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_.]*$")]
+Kind = Literal["grid", "one_at_a_time", "dispersion"]
+
+
+class PlannedQuantity(Section):
+    """A number that the study varies.
+
+    It stands for one parameter, for a factor on a table ('tables.NAME', nominal value 1), or for several that move
+    together. With ``relative`` its numbers are factors of the nominal value, 1.1 for 10 % more.
+    """
+
+    name: QuantityName
+    parameters: tuple[str, ...] = ()
+    relative: bool = False
+
+    @property
+    def targets(self) -> tuple[str, ...]:
+        """The parameters and tables behind the quantity."""
+        return self.parameters or (self.name,)
+
+
+class GridQuantity(PlannedQuantity):
+    """``values``, or ``linspace = [first, last, count]``."""
+
+    values: tuple[Finite, ...] = ()
+    linspace: tuple[Finite, Finite, Annotated[int, Field(ge=2)]] | None = None
+
+    @model_validator(mode="after")
+    def _one_list(self) -> Self:
+        if bool(self.values) == (self.linspace is not None):
+            raise ValueError("needs either values = [...] or linspace = [first, last, count]")
+        return self
+
+    def axis(self) -> list[float]:
+        """Return the values."""
+        if self.linspace is None:
+            return list(self.values)
+        first, last, count = self.linspace
+        return np.linspace(first, last, count).tolist()
+
+
+class SweptQuantity(PlannedQuantity):
+    """``low`` and ``high``, or ``plus_minus`` about the nominal value."""
+
+    low: Finite | None = None
+    high: Finite | None = None
+    plus_minus: Positive | None = None
+
+    @model_validator(mode="after")
+    def _one_range(self) -> Self:
+        _check_range(self.low, self.high, self.plus_minus)
+        return self
+
+
+class DispersedQuantity(PlannedQuantity):
+    """A random quantity; ``mean`` is the nominal value where it is not given."""
+
+    distribution: Literal["normal", "truncated_normal", "uniform"]
+    mean: Finite | None = None
+    sigma: Positive | None = None
+    low: Finite | None = None
+    high: Finite | None = None
+    plus_minus: Positive | None = None
+
+    @model_validator(mode="after")
+    def _complete(self) -> Self:
+        if self.distribution == "uniform":
+            if self.sigma is not None or self.mean is not None:
+                raise ValueError("is uniform and takes low and high, or plus_minus; remove sigma and mean")
+        elif self.sigma is None:
+            raise ValueError(f"is {self.distribution} and needs a sigma above zero")
+        if self.distribution != "normal":
+            _check_range(self.low, self.high, self.plus_minus)
+        elif not self.low is self.high is self.plus_minus is None:
+            raise ValueError('is normal, without limits; take "truncated_normal", or remove low, high and plus_minus')
+        return self
+
+
+def _check_range(low: float | None, high: float | None, plus_minus: float | None) -> None:
+    if (low is None) != (high is None) or (low is None) == (plus_minus is None):
+        raise ValueError("needs either low and high, or plus_minus")
+    if low is not None and high is not None and low >= high:
+        raise ValueError(f"has low = {low:g}, which is not below high = {high:g}")
+
+
+class Correlation(Section):
+    """Correlation of the normal scores of two quantities."""
+
+    between: tuple[str, str]
+    coefficient: Annotated[float, Field(gt=-1, lt=1)]
+
+
+class Grid(Section):
+    """All combinations; the last quantity varies fastest."""
+
+    quantity: Annotated[tuple[GridQuantity, ...], Field(min_length=1)]
+
+
+class OneAtATime(Section):
+    """Each quantity at its low and at its high value, the others nominal."""
+
+    quantity: Annotated[tuple[SweptQuantity, ...], Field(min_length=1)]
+
+
+class Dispersion(Section):
+    """Random members."""
+
+    members: Annotated[int, Field(ge=2)]
+    seed: Annotated[int, Field(ge=0)]
+    sampling: Literal["random", "latin_hypercube", "sobol"] = "latin_hypercube"
+    quantity: Annotated[tuple[DispersedQuantity, ...], Field(min_length=1)]
+    correlation: tuple[Correlation, ...] = ()
+
+
+class ParameterStudyPlan(Section):
+    """The whole TOML file.
+
+    ``times`` are the vehicle's ``default_times``, ``responses`` and ``sources`` all of them where they are not given.
+    """
+
+    format: Literal[1]
+    title: str
+    vehicle: str | None = None
+    times: str | None = None
+    responses: tuple[str, ...] | None = None
+    sources: tuple[str, ...] | None = None
+    relative_tolerance: Positive = 1e-4
+    grid: Grid | None = None
+    one_at_a_time: OneAtATime | None = None
+    dispersion: Dispersion | None = None
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> Self:
+        if sum(part is not None for part in (self.grid, self.one_at_a_time, self.dispersion)) != 1:
+            raise ValueError("needs exactly one of [grid], [one_at_a_time] and [dispersion]")
+        names = [q.name for q in self.quantities]
+        repeated = sorted({n for n in names if names.count(n) > 1})
+        if repeated:
+            raise ValueError(f"has two quantities named '{repeated[0]}'; rename one")
+        return self
+
+    @property
+    def kind(self) -> Kind:
+        """Which of the three tables the plan has."""
+        if self.grid is not None:
+            return "grid"
+        return "dispersion" if self.dispersion is not None else "one_at_a_time"
+
+    @property
+    def quantities(self) -> tuple[PlannedQuantity, ...]:
+        """What is varied."""
+        part = self.grid or self.one_at_a_time or self.dispersion
+        assert part is not None  # checked by _one_kind
+        return part.quantity
+
+
+def read_plan(source: str | Path | Mapping[str, Any] | ParameterStudyPlan) -> ParameterStudyPlan:
+    """Return a plan from a TOML file, from a mapping of the same form, or as it is.
+
+    A ``vehicle`` that is a folder beside the TOML file is found from there.
+
+    Raises
+    ------
+    DataError
+        The file, the key in it, what is wrong and the nearest valid key.
+    """
+    if isinstance(source, ParameterStudyPlan):
+        return source
+    if isinstance(source, Mapping):
+        return validated(source, ParameterStudyPlan)
+    file = Path(source)
+    plan = read_toml(file, ParameterStudyPlan)
+    if plan.vehicle is None:
+        raise DataError("is missing; name a shipped vehicle or a vehicle folder", file=file, column="vehicle")
+    beside = file.parent / plan.vehicle
+    return plan.model_copy(update={"vehicle": str(beside)}) if beside.is_dir() else plan

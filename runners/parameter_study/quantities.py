@@ -1,0 +1,137 @@
+"""From the names of a plan to the numbers of a study: parameters, and factors on whole tables."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...codegen.compiled import ExecutableSystem
+from ...model.errors import DataError, suggestion
+from ...model.tables import TableGroup
+from ..sensitivity import STRUCTURAL
+from ..study import Study
+from .plan import ParameterStudyPlan, PlannedQuantity
+
+TABLES = "tables."
+MEAN_GROUP = "mean"  # tables that follow from the others
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A number that a parameter study varies.
+
+    Attributes
+    ----------
+    name, unit : str
+        The unit is '1' for a factor.
+    targets : tuple of str
+        Parameters, and tables as 'tables.NAME', that take its value.
+    relative : bool
+        Whether the value multiplies the nominal ones.
+    nominal : float
+        Its value in the unchanged study.
+    """
+
+    name: str
+    unit: str
+    targets: tuple[str, ...]
+    relative: bool
+    nominal: float
+
+
+def table_names(groups: Sequence[TableGroup]) -> list[str]:
+    """Return the tables that a factor may multiply, as 'tables.NAME'."""
+    return [TABLES + name for group in groups if group.name != MEAN_GROUP for name in group.names]
+
+
+def resolve_quantities(study: Study, plan: ParameterStudyPlan) -> tuple[Quantity, ...]:
+    """Look up the quantities of a plan.
+
+    Raises
+    ------
+    DataError
+        Unknown names with the nearest one, structure, a target named twice, a nominal value that is zero or not common.
+    """
+    taken: dict[str, str] = {}
+    found = []
+    for i, planned in enumerate(plan.quantities):
+        where = f"{plan.kind}.quantity.{i}"
+        for target in planned.targets:
+            _check_target(study, target, where)
+            if target in taken:
+                raise DataError(
+                    f"'{target}' already belongs to quantity '{taken[target]}'; a number has one value", column=where
+                )
+            taken[target] = planned.name
+        found.append(_resolve(study, planned, where))
+    return tuple(found)
+
+
+def _check_target(study: Study, name: str, where: str) -> None:
+    tables = table_names(study.executable.groups)
+    known = [*study.system.parameter_names, *tables]
+    if name in known:
+        return
+    if TABLES + name in tables:
+        raise DataError(f"'{name}' is a table; write '{TABLES}{name}' for a factor on the whole of it", column=where)
+    if name in study.system.structure or (STRUCTURAL.search(name) and not name.startswith(TABLES)):
+        raise DataError(
+            f"'{name}' is structure, not a number: another value makes other equations; edit the vehicle file and "
+            "make a study of each vehicle",
+            column=where,
+        )
+    raise DataError(f"there is no parameter or table '{name}'{suggestion(name, known)}", column=where)
+
+
+def _resolve(study: Study, planned: PlannedQuantity, where: str) -> Quantity:
+    parameters = study.parameters
+    values = {t: 1.0 if t not in parameters else parameters[t].value for t in planned.targets}
+    if planned.relative:
+        zero = next((t for t, value in values.items() if value == 0), None)
+        if zero is not None:
+            raise DataError(
+                f"'{zero}' is zero, so that a factor on it changes nothing; give absolute numbers, without relative",
+                column=where,
+            )
+        return Quantity(planned.name, "1", planned.targets, True, 1.0)
+    if len(set(values.values())) > 1:
+        listed = ", ".join(f"{t} = {value:g}" for t, value in values.items())
+        raise DataError(f"has parameters of different nominal value ({listed}); set relative = true", column=where)
+    first = planned.targets[0]
+    unit = parameters[first].unit if first in parameters else "1"
+    return Quantity(planned.name, unit, planned.targets, False, values[first])
+
+
+def member_numbers(study: Study, quantities: Sequence[Quantity], row: NDArray[np.float64]) -> ExecutableSystem:
+    """Return the system of a study with the numbers of one member.
+
+    Parameters
+    ----------
+    row : (quantities,) array
+
+    Raises
+    ------
+    ParameterValueError
+        A value that the equations cannot use.
+    """
+    parameters = study.parameters
+    changes: dict[str, float] = {}
+    factors: dict[str, float] = {}
+    for quantity, value in zip(quantities, row.tolist(), strict=True):
+        for target in quantity.targets:
+            if target in parameters:
+                changes[target] = value * parameters[target].value if quantity.relative else value
+            else:
+                factors[target.removeprefix(TABLES)] = value
+    groups = tuple(_scaled(group, factors) for group in study.executable.groups)
+    return study.executable.with_numbers(groups=groups, parameters=study._parameter_values(changes))
+
+
+def _scaled(group: TableGroup, factors: dict[str, float]) -> TableGroup:
+    """Return a group with some of its tables multiplied."""
+    if not factors.keys() & set(group.names):
+        return group
+    return replace(group, coefficients=group.coefficients * np.array([factors.get(name, 1.0) for name in group.names]))

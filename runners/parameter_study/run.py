@@ -1,0 +1,232 @@
+"""A parameter study from plan to stored result: resumed where it stood, nothing computed twice."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Mapping
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from ...model.errors import DataError, OutputFolderError, ParameterValueError, UnknownNameError
+from ..output import write_bytes
+from ..statistics import COMBINED, provenance
+from ..study import Study
+from ..sweep_engine import SweepOptions
+from ..times import parse_times
+from .cluster import compute_on_cluster
+from .compute import FAILED, STATUS, Chunk, ChunkResult, Task, chunks, compute_chunk
+from .local import compute_locally
+from .plan import ParameterStudyPlan, read_plan
+from .quantities import Quantity, resolve_quantities
+from .sampling import member_values
+from .store import ChunkStore, identity_of, netcdf_bytes, open_store
+
+RESULT_FILE = "study.nc"
+LARGEST = 2**31  # bytes of a variable in the file format
+
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True, eq=False)
+class ParameterStudy:
+    """A parameter study that has been computed.
+
+    Attributes
+    ----------
+    plan : ParameterStudyPlan
+    study : Study
+        With the nominal numbers.
+    quantities : tuple of Quantity
+        What was varied.
+    data : xarray.Dataset
+        ``value`` (member, quantity); ``status`` (member: 0 computed, 1 unstable, 2 failed) and ``reason``;
+        ``mean`` (member, time, response) and ``std`` (member, time, response, source), NaN where a member failed;
+        ``nominal_mean`` and ``nominal_std`` of the unchanged study.
+    """
+
+    plan: ParameterStudyPlan
+    study: Study
+    quantities: tuple[Quantity, ...]
+    data: xr.Dataset
+
+    @property
+    def computed(self) -> NDArray[np.bool_]:
+        """Members that have numbers, (members,)."""
+        return self.data["status"].values != FAILED
+
+
+def run_parameter_study(
+    plan: str | Path | Mapping[str, Any] | ParameterStudyPlan,
+    folder: str | Path,
+    *,
+    study: Study | None = None,
+    scheduler: str | None = None,
+    progress: Progress | None = None,
+) -> ParameterStudy:
+    """Compute the members of a parameter study that a folder does not hold yet, and put all together.
+
+    Parameters
+    ----------
+    plan : path, mapping or ParameterStudyPlan
+        A TOML file, or the same as a mapping (docs/studies.md).
+    folder : path
+        For chunks of members as they come, and ``study.nc``. One that holds a part of the same study is continued.
+    study : Study, optional
+        Instead of the plan's ``vehicle``; a system of your own too.
+    scheduler : str, optional
+        Address of a Dask scheduler; all cores of this machine without it.
+    progress : callable, optional
+        Called with the number of members done and of all.
+
+    Raises
+    ------
+    DataError, TimeRangeError, UnknownNameError
+        The plan asks for what the vehicle does not have.
+    ResumeError
+        The folder holds another study.
+    OutputFolderError
+        It cannot be written; what is stored stays.
+    SchedulerError, NoCompilerError
+    """
+    file = Path(plan) if isinstance(plan, str | Path) else None
+    plan = read_plan(plan)
+    if study is None:
+        if plan.vehicle is None:
+            raise DataError("is missing; name a shipped vehicle or a vehicle folder, or give a study", column="vehicle")
+        study = Study.load(plan.vehicle)
+    try:
+        quantities = resolve_quantities(study, plan)
+        values = member_values(plan, quantities)
+        task = _task(study, plan, quantities)
+        _check_size(study, task, len(values))
+    except DataError as error:
+        raise DataError(error.why, file=error.file or file, column=error.column) from None
+    folder = Path(folder)
+    with open_store(folder, identity_of(study, plan, task, values)) as store:
+        found = _complete(store, study, task, list(chunks(values)), len(values), scheduler, progress)
+        data = _dataset(study, plan, task, values, found)
+        write_bytes(folder / RESULT_FILE, netcdf_bytes(data))
+    return ParameterStudy(plan, study, quantities, data)
+
+
+def _task(study: Study, plan: ParameterStudyPlan, quantities: tuple[Quantity, ...]) -> Task:
+    text = plan.times or (study.vehicle.file.default_times if study.vehicle else None)
+    if text is None:
+        raise DataError("is missing; a system of your own has no default times", column="times")
+    times = sorted(set(parse_times(text)))
+    study._check_times(times)
+    SweepOptions(plan.relative_tolerance)
+    known = (*study.system.sources, COMBINED)
+    for source in plan.sources or ():
+        if source not in known:
+            raise UnknownNameError("noise source", source, known)
+    return Task(quantities, tuple(times), tuple(study._responses(plan.responses)), plan.relative_tolerance)
+
+
+def _check_size(study: Study, task: Task, members: int) -> None:
+    size = 8 * members * len(task.times) * len(task.responses) * (len(study.system.sources) + 1)
+    if size > LARGEST:
+        raise DataError(
+            f"{members} members at {len(task.times)} end times make {size / 1e9:.3g} GB of standard deviations, more "
+            "than a result file holds; take fewer times, responses or members"
+        )
+
+
+def _complete(
+    store: ChunkStore,
+    study: Study,
+    task: Task,
+    wanted: list[Chunk],
+    members: int,
+    scheduler: str | None,
+    progress: Progress | None,
+) -> list[ChunkResult]:
+    """Read what is stored, compute and store the rest."""
+    found = {chunk.first: result for chunk in wanted if (result := store.read(chunk)) is not None}
+    missing = [chunk for chunk in wanted if chunk.first not in found]
+    done = sum(len(result.status) for result in found.values())
+    if progress:
+        progress(done, members)
+    with closing(_results(study, task, missing, scheduler)) as results:
+        for chunk, result in results:
+            try:
+                store.write(chunk, result)
+            except OutputFolderError as error:
+                raise OutputFolderError(
+                    f"{error}; {done} of {members} members are stored and stay: make room, then run the same again"
+                ) from None
+            found[chunk.first] = result
+            done += len(result.status)
+            if progress:
+                progress(done, members)
+    return [found[chunk.first] for chunk in wanted]
+
+
+def _results(
+    study: Study, task: Task, missing: list[Chunk], scheduler: str | None
+) -> Generator[tuple[Chunk, ChunkResult], None, None]:
+    """Yield the chunks as they are done."""
+    if missing and scheduler:
+        yield from compute_on_cluster(scheduler, study, task, missing)
+    elif missing:
+        yield from compute_locally(study, task, missing)
+
+
+def _dataset(
+    study: Study, plan: ParameterStudyPlan, task: Task, values: NDArray[np.float64], found: list[ChunkResult]
+) -> xr.Dataset:
+    sources = [*(s for s in plan.sources or study.system.sources if s != COMBINED), COMBINED]
+    mean = np.concatenate([r.mean for r in found])
+    std = _std(study, sources, np.concatenate([r.variance for r in found]))
+    nominal = _nominal(study, task)
+    units = [study.system.outputs[study.system.output_index(r)].unit for r in task.responses]
+    by_response = "; ".join(f"{name}: {unit}" for name, unit in zip(task.responses, units, strict=True))
+    data = xr.Dataset(
+        {
+            "value": (("member", "quantity"), values, {"long_name": "value of a quantity"}),
+            "status": (
+                "member",
+                np.concatenate([r.status for r in found]),
+                {"flag_values": [*range(len(STATUS))], "flag_meanings": " ".join(STATUS)},
+            ),
+            "reason": ("member", [text for r in found for text in r.reason]),
+            "mean": (("member", "time", "response"), mean),
+            "std": (("member", "time", "response", "source"), std),
+            "nominal_mean": (("time", "response"), nominal.mean[0]),
+            "nominal_std": (("time", "response", "source"), _std(study, sources, nominal.variance[0])),
+        },
+        {
+            "time": ("time", list(task.times), {"units": "s", "long_name": "flight time t2"}),
+            "response": list(task.responses),
+            "unit": ("response", units),
+            "source": sources,
+            "quantity": [q.name for q in task.quantities],
+            "quantity_unit": ("quantity", [q.unit for q in task.quantities]),
+            "quantity_nominal": ("quantity", [q.nominal for q in task.quantities]),
+        },
+        provenance(study) | {"plan": plan.model_dump_json(exclude_none=True), "engine": "sweep"},
+    )
+    for name in ("mean", "std", "nominal_mean", "nominal_std"):
+        data[name].attrs["units"] = by_response
+    return data
+
+
+def _std(study: Study, sources: list[str], variance: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the standard deviations of chosen sources; all of them stand behind the combined one."""
+    names = list(study.system.sources)
+    columns = [variance.sum(axis=-1) if s == COMBINED else variance[..., names.index(s)] for s in sources]
+    return np.sqrt(np.stack(columns, axis=-1))
+
+
+def _nominal(study: Study, task: Task) -> ChunkResult:
+    """Return the statistics of the unchanged study, computed as a member is."""
+    nominal = np.array([[q.nominal for q in task.quantities]])
+    result = compute_chunk(study, task, Chunk(0, nominal))
+    if result.status[0] == FAILED:
+        raise ParameterValueError(f"the vehicle itself, nothing varied, fails: {result.reason[0]}")
+    return result

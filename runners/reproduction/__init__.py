@@ -1,0 +1,1 @@
+"""Our numbers beside those the report published: prediction, options, wind models, calibration, flight checks."""
