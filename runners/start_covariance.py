@@ -62,7 +62,7 @@ class StartShare:
 
 
 def start_share(vehicle: Vehicle | None, pair: AdjointPair, factor: float) -> StartShare | None:
-    """Return what ``factor`` times a variance owes to the wind filter below the start, if the wind is a source of it."""
+    """Return what ``factor`` times a variance owes to the wind filter below the start; None without wind."""
     if vehicle is None or "wind" not in pair.sources:
         return None
     shaping_filter = vehicle.wind.shaping_filter
