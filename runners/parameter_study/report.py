@@ -22,6 +22,7 @@ from .run import ParameterStudy
 from .spread import spread
 
 SHOWN_REASONS = 3
+ENDS = ("", "_low", "_high")  # of a percentile: value and interval
 
 
 def report(result: ParameterStudy, folder: Path, console: Console) -> list[Path]:
