@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -154,3 +156,5 @@ def test_unstable_mean_flight_names_its_time(as504):
     with pytest.raises(DataError, match=r"the mean flight is unstable.*control law") as caught:
         planar_mean(study.vehicle, study.executable)
     assert 10 < caught.value.time < 60
+    angles = [abs(float(a)) for a in re.findall(r"(-?\d+) deg", str(caught.value))]
+    assert 45 <= max(angles) < 60  # told when it begins, not when it tumbles

@@ -12,17 +12,17 @@ import xarray as xr
 from rich.console import Console
 from rich.table import Table
 
-from ..figures import display, words, write_figure
+from ..figures import words, write_figure
 from ..output import write_bytes
 from .changes import changes
 from .compute import COMPUTED, FAILED, STATUS
 from .figures import band_figure, grid_figure, histogram_figure, tornado_figure
-from .measures import LABELS, PEAK, measures
+from .measures import LABELS, PEAK, displayed, measures
 from .run import ParameterStudy
 from .spread import spread
 
 SHOWN_REASONS = 3
-ENDS = ("", "_low", "_high")  # of the names of a number and its interval
+ENDS = ("", "_low", "_high")  # of a percentile: value and interval
 
 
 def report(result: ParameterStudy, folder: Path, console: Console) -> list[Path]:
@@ -143,8 +143,7 @@ def _shown(value: float, factor: float, digits: int = 4) -> str:
 def _print_spread(found: xr.Dataset, console: Console) -> None:
     for response in _names(found, "response"):
         part = found.sel(response=response)
-        time = part["peak_time"].item()
-        factor, unit = display(part["unit"].item(), part["nominal"].sel(measure=PEAK))
+        (factor, unit), time = displayed(found, response), part["peak_time"].item()
         title = f"{words(response).capitalize()} ({unit}) of {found.attrs['members']} members"
         table = Table(title=f"{title}, below with 95 % intervals")
         table.add_column("of", no_wrap=True)
@@ -190,7 +189,7 @@ def _print_changes(found: xr.Dataset, console: Console) -> None:
         table.add_column(column, justify="right", no_wrap=True)
     for response in _names(found, "response"):
         part = found.sel(measure=PEAK, response=response)
-        factor, unit = display(part["unit"].item(), part["nominal"])
+        factor, unit = displayed(found, response)
         order = np.argsort(-np.abs(part["first_order_change"].values).max(axis=-1), kind="stable")
         for k, q in enumerate(order):
             at = part.isel(quantity=q)
@@ -214,7 +213,7 @@ def _print_grid(result: ParameterStudy, measured: xr.Dataset, console: Console) 
         values = peak.sel(response=response).values
         if not values.size:
             continue
-        factor, unit = display(str(measured["unit"].sel(response=response).item()), values)
+        factor, unit = displayed(measured, response)
         cells = [_shown(measured["nominal"].sel(measure=PEAK, response=response).item(), factor)]
         for k in (int(np.argmin(values)), int(np.argmax(values))):
             row = result.data["value"].values[measured["member"].values[k]]
