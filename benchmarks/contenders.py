@@ -8,16 +8,18 @@ from importlib.util import find_spec
 
 import casadi as ca
 import numpy as np
-from ascentwind.codegen.evaluation import MatrixEvaluator
 from ascentwind.codegen.functions import state_scales
 from ascentwind.runners import EnsembleOptions, IntegratorOptions, Study
 from ascentwind.runners.covariance import covariance_equation
 from ascentwind.runners.engines import ENGINES
 from ascentwind.runners.integration import intervals
+from numpy_ensembles import Scheme, ensemble, euler_maruyama, fourth_order
 from scipy.integrate import solve_ivp
 
 FLIGHTS = 4  # simulated one by one; 500 take 125 times as long
 ENSEMBLE_STEP = 0.02  # s; the fastest root, near 100 rad/s, allows 0.028 s to a fourth-order formula
+EULER_STEP = 5e-5  # s; the largest of 1, 2, 5 whose discretisation error stays below the sampling error of 500 flights
+EULER_SECONDS = 1.0  # of the flight
 
 
 @dataclass(frozen=True)
@@ -33,6 +35,8 @@ class Contender:
         True if it works an end time after another, so that its time on all end times follows from some.
     scale : float
         Factor on the time, for a method that did a known part of its work.
+    part : float or None
+        Run over this many seconds of the flight only, and the time scaled: every second costs the same.
     """
 
     method: str
@@ -40,6 +44,7 @@ class Contender:
     run: Callable[[np.ndarray], np.ndarray]
     each: bool
     scale: float = 1.0
+    part: float | None = None
 
 
 class Adjoint:
@@ -117,9 +122,16 @@ def contenders(study: Study) -> tuple[list[Contender], list[str]]:
             found.append(Contender("diffrax Dopri8, CPU", f"{tolerance:g}", diffrax_adjoints(study, tolerance), True))
     else:
         missing.append("diffrax is not installed: skipped (pip install -e '.[bench]')")
-    found.append(Contender("NumPy ensemble of 500, vectorised", "20 ms", _numpy_ensemble(study, 500), False))
-    few = _numpy_one_by_one(study, FLIGHTS)
-    found.append(Contender("NumPy ensemble of 500, flight by flight", "20 ms", few, False, 500 / FLIGHTS))
+    taylor, euler = fourth_order(ENSEMBLE_STEP), euler_maruyama(EULER_STEP)
+    found.append(Contender("NumPy ensemble of 500, order 4", "20 ms", _numpy_ensemble(study, taylor, 500), False))
+    few = _numpy_one_by_one(study, taylor, FLIGHTS)
+    found.append(Contender("NumPy ensemble of 500, order 4, flight by flight", "20 ms", few, False, 500 / FLIGHTS))
+    found.append(
+        Contender(
+            "NumPy ensemble of 500, Euler-Maruyama", f"{1e3 * EULER_STEP:g} ms",
+            _numpy_ensemble(study, euler, 500), False, part=EULER_SECONDS,
+        )
+    )  # fmt: skip
     found.append(
         Contender("ensemble of 500, compiled", "50 ms", _engine(study, "ensemble", EnsembleOptions(runs=500)), False)
     )
@@ -178,53 +190,22 @@ def _sundae(study: Study, tolerance: float) -> Callable[[np.ndarray], np.ndarray
     )
 
 
-def _numpy_ensemble(study: Study, runs: int) -> Callable[[np.ndarray], np.ndarray]:
+def _numpy_ensemble(study: Study, scheme: Scheme, runs: int) -> Callable[[np.ndarray], np.ndarray]:
     """Vectorised: all runs side by side share the transition of a step."""
-    flights = _numpy_flights(study, runs)
-    return lambda times: flights(times, np.random.default_rng(504)).std(axis=3, ddof=1)
-
-
-def _numpy_one_by_one(study: Study, runs: int) -> Callable[[np.ndarray], np.ndarray]:
-    """As a simulation is run again and again: one flight after another."""
-    flight = _numpy_flights(study, 1)
 
     def run(times: np.ndarray) -> np.ndarray:
-        random = np.random.default_rng(504)
-        return np.concatenate([flight(times, random) for _ in range(runs)], axis=3).std(axis=3, ddof=1)
+        return ensemble(study, scheme, runs, times, np.random.default_rng(504)).std(axis=3, ddof=1)
 
     return run
 
 
-def _numpy_flights(study: Study, runs: int) -> Callable[[np.ndarray, np.random.Generator], np.ndarray]:
-    """Simulated responses (times, responses, sources, runs): a fourth-order step of the drift and noise added to it."""
-    executable, system = study.with_means, study.system
+def _numpy_one_by_one(study: Study, scheme: Scheme, runs: int) -> Callable[[np.ndarray], np.ndarray]:
+    """As a simulation is run again and again: one flight after another."""
 
-    def run(times: np.ndarray, random: np.random.Generator) -> np.ndarray:
-        matrices, outputs = MatrixEvaluator(executable, ("A", "B")), MatrixEvaluator(executable, ("C",))
-        n, unit = len(system.states), np.eye(len(system.states))
-        x = np.zeros((n, len(system.sources), runs))
-        for s, source in enumerate(system.sources):
-            P = system.start_covariance_matrix(source, executable.parameters)
-            values, vectors = np.linalg.eigh(P)
-            x[:, s] = vectors @ (np.sqrt(np.maximum(values, 0))[:, None] * random.standard_normal((n, runs)))
-        found, begin = [], system.start
-        for time in times:
-            for piece in intervals(system, begin, float(time)):
-                steps = max(1, int(np.ceil((piece.end - piece.begin) / ENSEMBLE_STEP - 1e-9)))
-                h = (piece.end - piece.begin) / steps
-                for k in range(steps):
-                    A, B = matrices(piece.begin + (k + 0.5) * h, piece.low, piece.high)
-                    hA = h * A
-                    Phi = unit + hA @ (unit + hA @ (unit + hA @ (unit + hA / 4) / 3) / 2)
-                    x = (Phi @ x.reshape(n, -1)).reshape(x.shape)
-                    half = np.sqrt(h) * (unit + 0.5 * hA) @ B
-                    for s, source in enumerate(system.sources):
-                        columns = system.noise_columns(source)
-                        x[:, s] += half[:, columns] @ random.standard_normal((len(columns), runs))
-            begin = float(time)
-            last = intervals(system, system.start, begin)[-1]
-            (C,) = outputs(begin, last.low, last.high)
-            found.append(np.einsum("ri,isk->rsk", C, x))
-        return np.array(found)
+    def run(times: np.ndarray) -> np.ndarray:
+        random = np.random.default_rng(504)
+        return np.concatenate([ensemble(study, scheme, 1, times, random) for _ in range(runs)], axis=3).std(
+            axis=3, ddof=1
+        )
 
     return run

@@ -15,6 +15,7 @@ import os
 import platform
 import sys
 import time
+from collections.abc import Callable
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
@@ -38,7 +39,7 @@ DOCS = Path(__file__).parent.parent / "docs"
 def measure(study: Study, methods: list[Contender]) -> list[tuple[Contender, float, float, float]]:
     """Return (method, seconds for the job, error, MB above what stood before), all methods in turn."""
     reference = np.sqrt(covariance_equation(study.with_means, FULL.tolist(), 1e-13).variance)
-    some = reference[np.searchsorted(FULL, SOME)]
+    flight = FULL[-1] - study.system.start
     share = (FULL - study.system.start).sum() / (SOME - study.system.start).sum()
     seconds: dict[int, list[float]] = {k: [] for k in range(len(methods))}
     errors, memory = {}, {}
@@ -47,14 +48,18 @@ def measure(study: Study, methods: list[Contender]) -> list[tuple[Contender, flo
             if turn and min(seconds[k]) > SLOW:
                 continue
             times = SOME if method.each else FULL
+            scale = share if method.each else method.scale
+            if method.part is not None:
+                times, scale = study.system.start + np.array([method.part]), flight / method.part
             gc.collect()
             before = _peak_memory(reset=True)
             start = time.perf_counter()
             std = method.run(times)
-            seconds[k].append((time.perf_counter() - start) * (share if method.each else method.scale))
+            seconds[k].append((time.perf_counter() - start) * scale)
             if not turn:
                 memory[k] = _peak_memory() - before
-                errors[k] = float(np.abs(std / (some if method.each else reference) - 1).max())
+                expected = reference[np.searchsorted(FULL, times)]
+                errors[k] = float(np.abs(std / expected - 1).max())
         print(f"turn {turn + 1} of {ROUNDS} done", flush=True)
     return [(method, float(np.median(seconds[k])), errors[k], memory[k]) for k, method in enumerate(methods)]
 
@@ -114,7 +119,7 @@ def report(results: list, found: dict[str, Rows], missing: list[str], took: floa
         "and the adjoint from the same compiled code (diffrax: cubic pieces of the same A(t)), and the same tables of "
         "the mean response. Errors are the largest relative ones of a standard deviation, against SciPy's DOP853 on "
         "the covariance equation at 1e-13; for an ensemble they are sampling errors. Flight by flight, "
-        "4 flights were run and their time scaled to 500. Ratios are to "
+        "4 flights were run and their time scaled to 500; of Euler-Maruyama the first second of flight. Ratios are to "
         f"{ours[0].method} at {ours[0].setting}.", "",
         f"Machine: {_processor()}, {os.cpu_count()} cores. {_versions()}.", "",
         "| method | tolerance or step | time | ratio | error | memory above before |", "|---|---|---|---|---|---|",
@@ -132,6 +137,10 @@ def report(results: list, found: dict[str, Rows], missing: list[str], took: floa
         "writes `#error`. Its fixed-step `rk` therefore runs in CasADi and calls our compiled right-hand side.",
         "- scikit-sundae and SciPy reach the same compiled right-hand side through a Python function.",
         "- diffrax is timed after its compilation.",
+        "- NumPy ensembles that take at least 500 times as long as the sweep: "
+        f"{_ensembles(results, ours[1], lambda ratio: ratio >= 500)}; those that take less: "
+        f"{_ensembles(results, ours[1], lambda ratio: ratio < 500)}. Their discretisation errors, without sampling, "
+        "and what the error of the sweep would cost them: docs/performance.md.",
         "", "## Growth", "",
     ]  # fmt: skip
     for title, rows in found.items():
@@ -142,6 +151,11 @@ def report(results: list, found: dict[str, Rows], missing: list[str], took: floa
         lines.append("")
     return "\n".join([*lines, "A dash: foreseen to take too long for this run.", "",
                       "![Growth of run time](figures/benchmark_growth.png)", ""])  # fmt: skip
+
+
+def _ensembles(results: list, ours: float, wanted: Callable[[float], bool]) -> str:
+    ratios = {m.method: seconds / ours for m, seconds, *_ in results if m.method.startswith("NumPy")}
+    return ", ".join(f"{name} ({ratio:.3g})" for name, ratio in ratios.items() if wanted(ratio)) or "none"
 
 
 def _time(seconds: float) -> str:

@@ -37,6 +37,12 @@ class RungeKutta:
     def stages(self) -> int:
         return len(self.nodes)
 
+    @property
+    def minus_order_3(self) -> tuple[float, ...]:
+        """Minus the weights of the formula of order 3: fewer of them differ from zero than of ``error_3``."""
+        differences = (e - b for e, b in zip(self.error_3, self.weights, strict=True))
+        return tuple(d if abs(d) > 1e-14 else 0.0 for d in differences)
+
 
 DOP853 = RungeKutta(
     nodes=(

@@ -113,14 +113,16 @@ class CompiledSweep:
     def mean_history(
         self, executable: ExecutableSystem, segments: Segments, tolerance: float
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], dict[str, int]]:
-        """Return states (k, n) and outputs (k, responses) of the mean at the ends of the segments, and counters.
+        """Return states (k + 1, n) and outputs (k + 1, responses) of the mean at the start and all segment ends.
+
+        The third is the counters.
 
         Raises
         ------
         IntegrationError, DataError
         """
-        k = segments.end.size
-        states, outputs = np.empty((k, len(self.system.states))), np.empty((k, len(self.system.outputs)))
+        points = segments.end.size + 1
+        states, outputs = np.empty((points, len(self.system.states))), np.empty((points, len(self.system.outputs)))
         counters, failure = np.zeros(3), np.zeros(2)
         code = self._handle.mean_history(
             *self._arguments(executable, segments, tolerance), *map(_pointer, (states, outputs, counters, failure))

@@ -62,7 +62,9 @@ def validated(data: Mapping[str, Any], model: type[File], file: Path | None = No
     try:
         return model.model_validate(data)
     except ValidationError as error:
-        first = error.errors()[0]
+        errors = error.errors()
+        # a misspelt key is missing too; its spelling helps more
+        first = next((e for e in errors if e["type"] == "extra_forbidden"), errors[0])
         location = [str(part) for part in first["loc"]]
         if first["type"] == "extra_forbidden":
             why = f"is not a key here{suggestion(location[-1], _keys_at(model, location[:-1]))}"

@@ -180,6 +180,7 @@ class OptionsEntry(Section):
     full_coupling: bool = False
     local_angle_of_attack: bool = False
     slosh_reaction: bool = False
+    mean_response: Literal["linear", "nonlinear"] = "linear"
     extra_outputs: tuple[ExtraOutput, ...] = ()
 
 

@@ -13,8 +13,10 @@ from rich.logging import RichHandler
 from rich.table import Table
 
 from ..model.errors import AscentwindError, AscentwindWarning
-from .cli_checks import sensitivity, tolerance, verify
+from .cli_build import build_vehicle
+from .cli_checks import equations, sensitivity, tolerance, verify
 from .cli_design import design
+from .cli_mean import mean
 from .cli_study import study
 from .cli_wind import app as wind_app
 from .terminal import VehicleArgument, console, errors, parse_changes, progress_bar
@@ -26,8 +28,9 @@ app = typer.Typer(
     help="Response statistics of ascending launch vehicles in a random wind, by the method of adjoint systems.",
 )
 app.add_typer(wind_app, name="wind")
-for command in (verify, tolerance, sensitivity, study, design):
+for command in (verify, tolerance, sensitivity, equations, study, mean, design):
     app.command()(command)
+app.command("build-vehicle")(build_vehicle)
 
 
 @app.command()
@@ -44,8 +47,13 @@ def run(
         list[str] | None,
         typer.Option("--set", help="KEY=VALUE in the place of vehicle.toml's, e.g. options.full_coupling=true."),
     ] = None,
+    along_vehicle: Annotated[
+        str | None,
+        typer.Option(help="Bending moment along the vehicle at this time (s, or 'peak'), and its envelope."),
+    ] = None,
 ) -> None:
     """Mean, variance and mean + 3 sigma of all responses over flight time: tables and figures."""
+    from .along_vehicle_output import prepare_along_vehicle, write_along_vehicle
     from .engines import engine_options
     from .figures import response_figure, weighting_figure, words, write_figure
     from .output import prepare_folder, write_statistics
@@ -59,6 +67,7 @@ def run(
         study = Study.load(vehicle, changes=parse_changes(changes or []))
     assert study.vehicle is not None
     end_times = parse_times(times or study.vehicle.file.default_times)
+    moment_time = None if along_vehicle is None else prepare_along_vehicle(study, along_vehicle)
     families = [t for t in study.vehicle.file.weighting_times_s if study.system.start < t <= study.system.end]
     with progress_bar() as progress:
         task = progress.add_task("end times", total=len(end_times))
@@ -85,6 +94,9 @@ def run(
             figure = weighting_figure(weighting, first.name, first.unit, title)
             written += write_figure(figure, folder, "weighting_functions")
         progress.advance(task)
+    if along_vehicle is not None:
+        with console.status("bending moment along the vehicle"):
+            written += write_along_vehicle(study, end_times, moment_time, folder)
     _print_peaks(statistics)
     top = study.vehicle.wind.mean.argument[-1]
     if study.tables(end_times[-1])["altitude"] > top:

@@ -1,4 +1,4 @@
-"""The commands that check and study results: ``verify``, ``tolerance`` and ``sensitivity``."""
+"""The commands that check and study results: ``verify``, ``tolerance``, ``sensitivity`` and ``equations``."""
 
 from __future__ import annotations
 
@@ -37,6 +37,34 @@ def sensitivity(
     print_sensitivity(found, console)
     written = write_sensitivity(found, folder)
     console.print(f"{len(written)} files in {folder}: {', '.join(p.name for p in written)}", soft_wrap=True)
+
+
+def equations(
+    vehicle: VehicleArgument = "as504",
+    of: Annotated[
+        str | None,
+        typer.Option(help="'4-1' to '4-13', an output, or a state for its rate; all of 4-1 to 4-13 without."),
+    ] = None,
+    by: Annotated[str | None, typer.Option(help="The derivative by this table, parameter, state or input.")] = None,
+    page: Annotated[Path | None, typer.Option(help="Write 4-1 to 4-13 and their derivatives to this file.")] = None,
+) -> None:
+    """The equations and any derivative of them as LaTeX, with the report's symbols."""
+    from .equation_latex import equation_latex, equation_names
+    from .equation_page import equations_page
+    from .output import write_whole
+    from .study import Study
+
+    study = Study.load(vehicle)
+    if page is not None:
+        text = equations_page(study)
+        write_whole(page, lambda p: p.write_text(text))
+        console.print(f"{page} written", soft_wrap=True)
+    elif of is not None:
+        typer.echo(equation_latex(study, of, by))
+    else:
+        for name in equation_names(study):
+            if name.startswith("4-"):
+                typer.echo(f"{name}: {equation_latex(study, name)}")
 
 
 def verify(

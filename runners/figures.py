@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,7 @@ DISPLAY = {
     "1": (1.0, "1"),
 }
 MOMENTS = ((1e6, "MN m"), (1e3, "kN m"), (1.0, "N m"))  # the first that leaves the largest value at 1 or more
+TITLE_WIDTH = 76  # characters across a figure of 8 inches
 STYLE: dict[Any, Any] = {
     "figure.figsize": (8.0, 5.0),
     "figure.dpi": 110,
@@ -47,6 +49,11 @@ def display(unit: str, values: ArrayLike) -> tuple[float, str]:
         size, shown = next((m for m in MOMENTS if largest >= m[0]), MOMENTS[0])
         return 1 / size, shown
     return DISPLAY.get(unit, (1.0, unit))
+
+
+def wrapped(title: str) -> str:
+    """Return a title with its long lines broken, so that they stay on the figure."""
+    return "\n".join(fill(line, TITLE_WIDTH) for line in title.splitlines())
 
 
 def words(name: str) -> str:
@@ -87,7 +94,7 @@ def response_figure(statistics: ResponseStatistics, response: str, title: str) -
         )
         axes.axhline(0, color="black", lw=0.6)
         axes.margins(y=0.12)
-        axes.set(xlabel="flight time (s)", ylabel=f"{words(response)} ({unit})", title=title)
+        axes.set(xlabel="flight time (s)", ylabel=f"{words(response)} ({unit})", title=wrapped(title))
         axes.legend()
     return figure
 
@@ -108,7 +115,7 @@ def weighting_figure(families: Sequence[xr.Dataset], response: str, unit: str, t
         panels[0, 0].set(xlim=(first, latest + 1))
         panels[-1, 0].set(xlabel="time of the wind impulse t (s)")
         figure.supylabel(f"g(t₂, t): {words(response)} at t₂ ({shown} per m/s · s)")
-        figure.suptitle(title)
+        figure.suptitle(wrapped(title))
     return figure
 
 

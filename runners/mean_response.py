@@ -102,12 +102,12 @@ def with_mean_tables(
             columns.append(mean.outputs[:, system.output_index(what)])
         else:
             columns.append(mean.states[:, system.state_names.index(what)])
-    filled = _splines(group, np.stack(columns, axis=1), system.discontinuities)
+    filled = mean_splines(group, np.stack(columns, axis=1), system.discontinuities)
     return executable.with_numbers(groups=(*executable.groups[:at], filled, *executable.groups[at + 1 :]))
 
 
-def _splines(group: TableGroup, values: NDArray[np.float64], discontinuities: tuple[float, ...]) -> TableGroup:
-    """Interpolate between discontinuities, across which the mean has corners."""
+def mean_splines(group: TableGroup, values: NDArray[np.float64], discontinuities: tuple[float, ...]) -> TableGroup:
+    """Return the group with values at its knots, interpolated between discontinuities, where the mean has corners."""
     knots = group.knots
     edges = [0, *(int(np.argmin(np.abs(knots - d))) for d in discontinuities), knots.size - 1]
     pieces = [np.moveaxis(CubicSpline(knots[a : b + 1], values[a : b + 1]).c[::-1], 0, 1) for a, b in pairwise(edges)]

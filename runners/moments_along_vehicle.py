@@ -25,7 +25,12 @@ if TYPE_CHECKING:
 
 
 def moments_along_vehicle(
-    study: Study, times: Iterable[float], *, engine: str | None = None, options: object | None = None
+    study: Study,
+    times: Iterable[float],
+    *,
+    slosh_reaction: bool = True,
+    engine: str | None = None,
+    options: object | None = None,
 ) -> xr.Dataset:
     """Return mean, variance, std and mean + 3 sigma of the bending moment over (time, station, source).
 
@@ -35,6 +40,9 @@ def moments_along_vehicle(
         Of a vehicle with ``tables.loads_along_vehicle``.
     times : iterable of float
         Flight times, s.
+    slosh_reaction : bool
+        Whether the whole vehicle answers slosh. Without, as the report has it, the moment does not vanish at the tail.
+        Here it does not follow the vehicle's option, which is for its outputs.
     engine : {'sweep', 'covariance'}, optional
         Those that give covariances; the sweep where something is compiled.
     options : SweepOptions or CovarianceOptions, optional
@@ -55,7 +63,7 @@ def moments_along_vehicle(
     if "covariance" not in found:
         raise IntegrationError(f"engine '{found.attrs['engine']}' gives no covariances; use sweep or covariance")
     at = found["time"].values
-    rows = station_rows(components, loads, at)
+    rows = station_rows(components, loads, at, slosh_reaction)
     mean = np.einsum("tnc,tc->tn", rows, found.mean.sel(source=COMBINED).values)
     variance = np.einsum("tnc,tscd,tnd->tns", rows, found["covariance"].values, rows)
     variance = np.maximum(variance, 0.0)  # rounding, where every coefficient vanishes
@@ -74,7 +82,7 @@ def moments_along_vehicle(
             "forward_of_gimbal": ("station", loads.forward_of_gimbal, {"units": "m"}),
             "source": found["source"].values,
         },
-        provenance(study) | {"engine": found.attrs["engine"]},
+        provenance(study) | {"engine": found.attrs["engine"], "slosh_reaction": str(slosh_reaction).lower()},
     )
     for name in dataset:
         dataset[name].attrs["units"] = "(N m)^2" if name == "variance" else "N m"
@@ -92,18 +100,19 @@ def _with_components(study: Study) -> Study:
     return made.with_parameters({name: p.value for name, p in study.parameters.items()})
 
 
-def station_rows(study: Study, loads: StationLoads, times: NDArray[np.float64]) -> NDArray[np.float64]:
+def station_rows(
+    study: Study, loads: StationLoads, times: NDArray[np.float64], slosh_reaction: bool
+) -> NDArray[np.float64]:
     """Return K, the coefficient of each component at each station, (times, stations, components)."""
     assert study.vehicle is not None
-    options = study.vehicle.file.options
     tanks = [tank.name for tank in study.vehicle.slosh]
     times = np.where(np.isin(times, study.system.discontinuities), np.nextafter(times, -np.inf), times)  # left of jumps
     columns = loads.at(times)
     zero = np.zeros((times.size, loads.station.size))
     columns |= {f"slosh_displacement_{tank}": zero for tank in tanks}
-    if not options.local_angle_of_attack:
+    if not study.vehicle.file.options.local_angle_of_attack:
         columns |= {name: zero for name, _, _ in local_load_columns(len(study.vehicle.bending))}
-    if options.slosh_reaction:
+    if slosh_reaction:
         columns |= _with_reaction(columns, loads, tanks, [study.tables(float(time)) for time in times])
     return np.stack([columns[c] for c in component_columns(len(study.vehicle.bending), tanks).values()], axis=2)
 

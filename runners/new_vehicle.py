@@ -7,6 +7,7 @@ import shutil
 import tempfile
 from pathlib import Path
 
+from ..model.construction.construction_file import CONSTRUCTION_FILE
 from ..model.errors import OutputFolderError
 from ..model.shipped import find_vehicle
 from ..model.vehicle import VEHICLE_FILE, load_vehicle
@@ -31,8 +32,10 @@ def copy_vehicle(source: str | Path, folder: Path) -> list[Path]:
         with tempfile.TemporaryDirectory(dir=folder.parent) as work:
             made = Path(work) / "vehicle"
             shutil.copytree(start, made, copy_function=shutil.copyfile)
-            toml = made / VEHICLE_FILE
-            toml.write_text(re.sub(r'(?m)^name = ".*"', f'name = "{name}"', toml.read_text(), count=1))
+            for file in (VEHICLE_FILE, CONSTRUCTION_FILE):
+                toml = made / file
+                if toml.is_file():
+                    toml.write_text(re.sub(r'(?m)^name = ".*"', f'name = "{name}"', toml.read_text(), count=1))
             made.replace(folder)
     except OSError as error:
         raise OutputFolderError(f"{folder} cannot be made ({error.strerror or error}); choose another folder") from None

@@ -14,15 +14,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from ..model.assemble import MEAN_TABLES
-from ..model.system import LinearSystem
 from .collocation_grid import STAGES, tables_at
 from .flight_nodes import FlightNodes
 from .integration import intervals
+from .start_covariance import start_functions
 
 SLOPE_STEP = 1e-3  # s, of central differences of the output matrices, which are cubic in time
 
@@ -54,12 +53,37 @@ class Gradient:
 
 
 @dataclass(frozen=True, eq=False)
-class _MeanPath:
-    """Derivatives of a variance with respect to the mean: along the flight per second, and at t2."""
+class MeanPath:
+    """Derivatives of a variance with respect to the mean's states and outputs: per second of flight, and at t2."""
 
     on_states: NDArray[np.float64]
     on_outputs: NDArray[np.float64]
     on_states_at_end: NDArray[np.float64]
+    on_outputs_at_end: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Combination:
+    """Derivatives of a combination of variance and mean, and the adjoint of the linear form that they come from.
+
+    Attributes
+    ----------
+    numbers : (n_z,) array
+    tables : (k, n_v) array
+        Per second.
+    tables_at_end : (n_v,) array
+    adjoint : (k, n) array
+        Of the mean's states.
+    on_outputs : (k, n_y) array
+        Derivatives with respect to the mean's outputs, per second.
+    on_outputs_at_end : (n_y,) array
+    """
+
+    numbers: NDArray[np.float64]
+    tables: NDArray[np.float64]
+    tables_at_end: NDArray[np.float64]
+    adjoint: NDArray[np.float64]
+    on_outputs: NDArray[np.float64]
     on_outputs_at_end: NDArray[np.float64]
 
 
@@ -97,8 +121,8 @@ class AdjointPair:
         self.adjoint, self.adjoint_at_start = stages.reshape(-1, n), edges[0]
         B = self.matrices["B"]
         white = self.mask * B.transposed_times(self.adjoint)
-        covariance = sum((system.start_covariance_matrix(s, executable.parameters) for s in sources), np.zeros((n, n)))
-        start = covariance @ self.adjoint_at_start
+        product = start_functions(system, sources)[0]
+        start = np.array(product(executable.parameters, self.adjoint_at_start), float).ravel()
         stages, edges = flight.solver.forward(start, B.times(white).reshape(steps, STAGES, n))
         self.dual, self.dual_at_end = stages.reshape(-1, n), edges[-1]
         self.variance = float(self.weights @ np.sum(white**2, axis=1) + self.adjoint_at_start @ start)
@@ -127,17 +151,14 @@ class AdjointPair:
         mean = C_rate @ self.states_at_end + C @ m["E"] @ u + direct
         return float(variance), float(mean)
 
-    def gradient(self, variance_factor: float, mean_factor: float) -> Gradient:
-        """Return the derivatives of ``variance_factor`` variance + ``mean_factor`` mean."""
-        system, p, functions = self.executable.system, self.executable.parameters, self.flight.functions
-        n, r = len(system.states), len(system.outputs)
+    def combine(self, variance_factor: float, mean_factor: float) -> Combination:
+        """Return the sums over nodes and end of the gradients of both forms, for a combination of both numbers."""
+        functions, n, r = self.flight.functions, self.adjoint.shape[1], self.at_end["C"].shape[0]
         at = (self.weights, self.times, self.tables, self.flight.numbers)
         at_end = (np.ones(1), np.array([self.end]), self.tables_at_end[None], self.flight.numbers)
         selected, still = np.eye(r)[self.response], np.zeros((1, n))
         numbers, along = np.zeros(self.flight.numbers.size), np.zeros_like(self.tables)
-        last = np.zeros(system.v.numel())
-        at_start = np.zeros(p.size)
-        adjoint = mean_factor * self.adjoint
+        last, adjoint = np.zeros(self.tables.shape[1]), mean_factor * self.adjoint
         on_outputs, on_outputs_end = np.zeros((self.times.size, r)), mean_factor * selected
 
         def add(inside: tuple[NDArray, NDArray], end: tuple[NDArray, NDArray], factor: float) -> None:
@@ -151,10 +172,11 @@ class AdjointPair:
                 functions.quadratic_gradient(*at_end, still, self.dual_at_end[None], selected, self.mask),
                 variance_factor,
             )
-            at_start = variance_factor * self._start_gradient(system, p)
-            path = self._mean_path(along, last)
+            path = self.mean_path(along, last)
             if path is not None:
-                stages, _ = self.flight.solver.backward(path.on_states_at_end, path.on_states.reshape(-1, STAGES, n))
+                on_states = path.on_states + self.matrices["C"].transposed_times(path.on_outputs)
+                at_last = path.on_states_at_end + path.on_outputs_at_end @ self.at_end["C"]
+                stages, _ = self.flight.solver.backward(at_last, on_states.reshape(-1, STAGES, n))
                 adjoint = adjoint + stages.reshape(-1, n)
                 on_outputs, on_outputs_end = on_outputs + path.on_outputs, on_outputs_end + path.on_outputs_at_end
         if adjoint.any() or on_outputs_end.any():
@@ -163,27 +185,26 @@ class AdjointPair:
                 functions.linear_gradient(*at_end, still, self.states_at_end[None], on_outputs_end[None]),
                 1.0,
             )
+        return Combination(numbers, along, last, adjoint, on_outputs, on_outputs_end)
+
+    def gradient(self, variance_factor: float, mean_factor: float) -> Gradient:
+        """Return the derivatives of ``variance_factor`` variance + ``mean_factor`` mean."""
+        p, found = self.executable.parameters, self.combine(variance_factor, mean_factor)
+        parameters = self.flight.functions.by_parameters(p, found.numbers)
+        if variance_factor:
+            by_start = start_functions(self.executable.system, self.sources)[1](p, self.adjoint_at_start)
+            parameters = parameters + variance_factor * np.array(by_start, float).ravel()
         value = variance_factor * self.variance + mean_factor * self.mean
-        parameters = functions.by_parameters(p, numbers) + at_start
-        return Gradient(value, parameters, self.times, self.weights, along, last)
+        return Gradient(value, parameters, self.times, self.weights, found.tables, found.tables_at_end)
 
-    def _start_gradient(self, system: LinearSystem, p: NDArray) -> NDArray:
-        a, found = ca.DM(self.adjoint_at_start), np.zeros(p.size)
-        for source in self.sources:
-            given = system.start_covariance.get(source)
-            if isinstance(given, ca.SX):
-                form = ca.gradient(ca.bilin(given, a, a), system.p)
-                found += np.array(ca.Function("start", [system.p], [ca.densify(form)])(p)).ravel()
-        return found
-
-    def _mean_path(self, on_tables: NDArray, on_tables_end: NDArray) -> _MeanPath | None:
-        """Move what the variance owes to the tables of the mean response on to the mean's states and outputs."""
+    def mean_path(self, on_tables: NDArray, on_tables_end: NDArray) -> MeanPath | None:
+        """Give what the variance owes to the tables of the mean response to the mean's states and outputs."""
         system = self.executable.system
         names = [name for g in self.executable.groups for name in g.names]
         if not set(MEAN_TABLES) <= set(names):
             return None
         k, n, r = self.times.size, len(system.states), len(system.outputs)
-        path = _MeanPath(np.zeros((k, n)), np.zeros((k, r)), np.zeros(n), np.zeros(r))
+        path = MeanPath(np.zeros((k, n)), np.zeros((k, r)), np.zeros(n), np.zeros(r))
         for name, (kind, what) in MEAN_TABLES.items():
             along, last = on_tables[:, names.index(name)], on_tables_end[names.index(name)]
             if kind == "output":
@@ -194,6 +215,4 @@ class AdjointPair:
                 state = system.state_names.index(what)
                 path.on_states[:, state] += along
                 path.on_states_at_end[state] += last
-        path.on_states[:] += self.matrices["C"].transposed_times(path.on_outputs)
-        path.on_states_at_end[:] += path.on_outputs_at_end @ self.at_end["C"]
         return path

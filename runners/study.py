@@ -12,6 +12,7 @@ from ..model.errors import ParameterValueError
 from .adjoint import AdjointSolver
 from .engines import Progress, batch_dataset, compute_statistics
 from .integration import IntegratorOptions
+from .second_derivatives import second_derivatives
 from .sensitivity import sensitivity
 from .sensitivity_check import check_sensitivity
 from .sensitivity_family import sensitivities
@@ -117,6 +118,7 @@ class Study(StudyNumbers):
         """
         if not parameter_sets:
             raise ParameterValueError("a batch needs at least one set of parameter values")
+        self._require_linear_mean("a batch")
         ends = sorted({float(t) for t in times})
         self._check_times(ends)
         options = options or SweepOptions(relative_tolerance=1e-4)
@@ -227,6 +229,7 @@ class Study(StudyNumbers):
         UndefinedElasticityWarning
             Parameters that are zero; their ``elasticity_defined`` is 0.
         """
+        self._require_linear_mean("a sensitivity")
         return sensitivity(self, response, time, source, quantity, parameters, elasticity)
 
     def sensitivities(
@@ -260,6 +263,41 @@ class Study(StudyNumbers):
         """
         return sensitivities(self, responses, times, source, quantity, parameters)
 
+    def second_derivatives(
+        self,
+        response: str,
+        time: float | Literal["peak"],
+        parameters: Iterable[str],
+        *,
+        source: str = COMBINED,
+        quantity: str = "std",
+    ) -> xr.Dataset:
+        """Return the second derivatives of one number with respect to at most ten parameters.
+
+        They are exact for the discretised variance and mean, as first derivatives are; what goes through the mean
+        response in the noise columns is exact to the order of the method. At 'peak' the time is held: the second
+        derivative of the maximum itself has a further part, by the shift of the peak.
+
+        Parameters
+        ----------
+        response, time, source, quantity
+            As for :meth:`sensitivity`.
+        parameters : iterable of str
+
+        Returns
+        -------
+        xarray.Dataset
+            ``second_derivative`` (parameter, with_respect_to), symmetric, and ``derivative`` (parameter); the
+            attribute ``asymmetry`` is how far both triangles were apart before, relative to the largest entry.
+
+        Raises
+        ------
+        ParameterValueError
+            For none or more than ten parameters.
+        UnknownNameError, StructuralParameterError, TimeRangeError, DirectNoiseError, ZeroQuantityError
+        """
+        return second_derivatives(self, response, time, parameters, source, quantity)
+
     def check_sensitivity(
         self,
         response: str,
@@ -285,4 +323,5 @@ class Study(StudyNumbers):
             Over (item): ``derivative``, ``difference``, its ``uncertainty``, how far they are ``apart`` and whether
             the sensitivity ``agrees`` to 1e-5 and the uncertainty.
         """
+        self._require_linear_mean("a sensitivity")
         return check_sensitivity(self, response, time, source, quantity, parameters, rows)

@@ -21,6 +21,7 @@ from ..model.vehicle import Vehicle, load_vehicle
 from ..model.wind_filter import ShapingFilter
 from ..model.wind_statistics import WindModel
 from .mean_response import with_mean_tables
+from .planar_mean import with_nonlinear_mean
 from .stability import Root, check_coupling, matrices_at, roots
 from .sweep_engine import sweep_of, with_sweep_mean_tables
 from .wind_range import warn_beyond
@@ -137,11 +138,18 @@ class StudyNumbers:
         return study.with_parameters(values)
 
     @cached_property
-    def with_means(self) -> ExecutableSystem:
-        """The system with its tables of the mean response, which the noise coefficients need, filled in."""
+    def linear_means(self) -> ExecutableSystem:
+        """The system with its tables of the mean response filled in by the linear mean."""
         if self.executable.shared_library is None:
             return with_mean_tables(self.executable)
         return with_sweep_mean_tables(sweep_of(self.system), self.executable)
+
+    @cached_property
+    def with_means(self) -> ExecutableSystem:
+        """The system with the tables of the mean response that the noise coefficients need, as the options ask."""
+        if self.vehicle is not None and self.vehicle.file.options.mean_response == "nonlinear":
+            return with_nonlinear_mean(self.vehicle, self.linear_means)
+        return self.linear_means
 
     def matrices(self, time: float) -> tuple[NDArray, NDArray, NDArray, NDArray]:
         """Return A (n, n), B (n, n_w), C (n_y, n), D (n_y, n_w) at a time; names are in ``study.system``."""
@@ -158,6 +166,10 @@ class StudyNumbers:
         """Return every table value at a time (s) by name."""
         self._check_times([time])
         return table_values(self.with_means.groups, float(time))
+
+    def _require_linear_mean(self, what: str) -> None:
+        if self.vehicle is not None and self.vehicle.file.options.mean_response == "nonlinear":
+            raise ParameterValueError(f'{what} follows the linear mean response; set options.mean_response = "linear"')
 
     def _check_spacing(self, spacing: float) -> None:
         if not spacing > 0:

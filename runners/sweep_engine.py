@@ -195,14 +195,7 @@ def with_sweep_mean_tables(
         low, high = (np.array([getattr(p, side) for p in pieces])[which] for side in ("low", "high"))
         segments = Segments(float(times[0]), np.ascontiguousarray(times[1:]), low, high)
         states, outputs, _ = engine.mean_history(of, segments, relative_tolerance)
-        first = of.functions.response(
-            times[0], pieces[0].low, pieces[0].high, of.parameters, of.address, np.zeros(states.shape[1])
-        )
-        return MeanResponse(
-            times,
-            np.concatenate([np.zeros((1, states.shape[1])), states]),
-            np.concatenate([np.array(first.full()).T, outputs]),
-        )
+        return MeanResponse(times, states, outputs)
 
     return with_mean_tables(executable, mean)
 

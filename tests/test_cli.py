@@ -12,6 +12,7 @@ import pytest
 import xarray as xr
 from ascentwind.runners import Study
 from ascentwind.runners.cli import main
+from ascentwind.runners.mean_comparison import mean_comparison
 from ascentwind.runners.output import COLUMNS
 
 
@@ -115,3 +116,17 @@ def test_doctor_names_compiler_and_engine(ascentwind, monkeypatch):
     printed = ascentwind("doctor")
     assert "install cc" in printed
     assert "CasADi's interpreter" in printed
+
+
+def test_mean_prints_both_means(ascentwind, tmp_path, as504):
+    printed = ascentwind("mean", "as504", "--out", "found")
+    found = mean_comparison(as504)["mean"].sel(response="angle_of_attack")
+    linear, rigid, nonlinear = (np.rad2deg(found.sel(model=m).values) for m in found["model"].values)
+    k = [int(np.argmax(abs(v))) for v in (linear, nonlinear - rigid, linear - rigid)]
+    row = next(line for line in printed.splitlines() if "angle of attack" in line)
+    cells = [float(x) for x in re.findall(r"-?\d+\.\d+", row)]
+    expected = [linear[k[0]], found.time[k[0]], (nonlinear - rigid)[k[1]], found.time[k[1]], (linear - rigid)[k[2]]]
+    assert cells[:5] == pytest.approx([float(x) for x in expected], abs=0.051)
+    assert cells[2] == pytest.approx(float(expected[2]), abs=6e-5)
+    assert (tmp_path / "found" / "mean_response.png").read_bytes().startswith(b"\x89PNG")
+    assert "attitude (deg)" in (tmp_path / "found" / "mean_response.svg").read_text()

@@ -22,6 +22,7 @@ from ascentwind.model.errors import DataError, DirectNoiseError, IntegrationErro
 from ascentwind.model.system import define_system
 from ascentwind.runners.adjoint import AdjointSolver
 from ascentwind.runners.cores import available_cores
+from ascentwind.runners.covariance import covariance_equation
 from ascentwind.runners.integration import IntegratorOptions
 from ascentwind.runners.mean_response import with_mean_tables
 from ascentwind.runners.sweep_engine import BatchError, batch, sweep, with_sweep_mean_tables
@@ -41,10 +42,15 @@ def as504():
 
 
 @pytest.fixture(scope="module")
-def cvodes(as504):
-    # near the start CVODES' thrust variance, tiny against the wind's, is erratic: 7e-8 off at 1e-11, the sweep 1e-9
-    solver = AdjointSolver(as504[1], IntegratorOptions(relative_tolerance=1e-12))
-    return [solver.run(t) for t in TEN]
+def reference(as504):
+    """Variances and means at the ten times."""
+    executable = as504[1]
+    solver = AdjointSolver(executable, IntegratorOptions(relative_tolerance=1e-12))
+    runs = [solver.run(t) for t in TEN]
+    variance = np.array([run.variance for run in runs])
+    # near the start CVODES' thrust variance, tiny against the wind's, is erratic: 7e-8 off at 1e-11
+    variance[:2] = covariance_equation(executable, TEN[:2], 1e-12).variance
+    return variance, np.array([run.mean for run in runs])
 
 
 def lag(rate=-0.5, **options):
@@ -80,25 +86,25 @@ def oscillator_chain(count):
     )
 
 
-def test_agrees_with_cvodes_at_ten_times(as504, cvodes):
+def test_agrees_with_cvodes_and_the_covariance_equation_at_ten_times(as504, reference):
     engine, executable, _ = as504
-    result = sweep(engine, executable, TEN, relative_tolerance=1e-9)
-    variance = np.array([run.variance for run in cvodes])
-    mean = np.array([run.mean for run in cvodes])
-    np.testing.assert_allclose(np.sqrt(result.variance), np.sqrt(variance), rtol=1e-8)
+    result = sweep(engine, executable, TEN, relative_tolerance=1e-10)
+    variance, mean = reference
+    np.testing.assert_allclose(np.sqrt(result.variance), np.sqrt(variance), rtol=2e-9)
     deviation = np.sqrt(variance.sum(axis=2))
     assert np.abs((result.mean - mean) / deviation).max() < 1e-8
 
 
-def test_default_tolerance_is_met_and_the_estimate_covers_the_error(as504, cvodes):
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-6])
+def test_tolerance_is_met_and_the_estimate_covers_the_error(as504, reference, tolerance):
     engine, executable, _ = as504
-    result = sweep(engine, executable, TEN)
-    error = np.abs(np.sqrt(result.variance / np.array([run.variance for run in cvodes])) - 1)
-    assert error.max() < 1e-6
-    # from the fourth time on errors are far above the reference's own
+    result = sweep(engine, executable, TEN, relative_tolerance=tolerance)
+    error = np.abs(np.sqrt(result.variance / reference[0]) - 1).max(axis=(1, 2))
+    assert error.max() < tolerance
     estimate = result.error_estimate.transpose(0, 2, 1).max(axis=(1, 2))
-    assert (error.max(axis=(1, 2))[3:] <= estimate[3:]).all()
-    assert estimate.max() < 1e-4
+    # half a second after the start the thrust variance is tiny and the estimate several times too small
+    assert (error <= estimate)[1:].all()
+    assert estimate.max() < 100 * tolerance
 
 
 @pytest.mark.parametrize("source", ["wind", "thrust"])

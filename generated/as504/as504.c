@@ -21,7 +21,7 @@
  *   extra outputs: none
  *   full coupling: false
  *   states: 31
- *   table lengths: flight 63 x 175, wind 14 x 481, mean 3 x 2802
+ *   table lengths: flight 63 x 147, wind 14 x 481, mean 3 x 2802
  * States x
  *     0  lateral_velocity [m/s], scale 10.0
  *     1  attitude [rad], scale 0.02
@@ -250,9 +250,9 @@ static void lookup_group(double x, const double *data, int knots, int tables, do
 
 static void lookup(double t, double address, double *v) {
   const double *data = (const double *)(uintptr_t)address;
-  lookup_group(t, data + 0, 175, 63, v + 0); /* flight */
-  lookup_group(v[3], data + 44023, 481, 14, v + 63); /* wind */
-  lookup_group(t, data + 71384, 2802, 3, v + 77); /* mean */
+  lookup_group(t, data + 0, 147, 63, v + 0); /* flight */
+  lookup_group(v[3], data + 36939, 481, 14, v + 63); /* wind */
+  lookup_group(t, data + 64300, 2802, 3, v + 77); /* mean */
 }
 
 /* ---- Arithmetic: flight time t, table values v, parameters p, state x -> results. ---- */

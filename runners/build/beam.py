@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import cho_factor, cho_solve, eigh
+from scipy.linalg import cholesky, eigh, solve_triangular
 
 from ...model.construction import Construction
-from ...model.construction.structure import Stiffness
 from ...model.errors import ModeError
+from .beam_elements import cantilever_flexibility, element_flexibilities, static_rotations
+from .mass_line import rotary_line
 
 _SMALLEST_END_DISPLACEMENT = 1e-3  # of the largest in a mode
 
@@ -25,9 +25,10 @@ class BeamModes:
     frequency : (k,) array
         rad/s, increasing.
     generalized_mass : (k,) array
-        Integral of mass times displacement squared (kg).
+        Integral of mass times displacement squared, plus rotary inertia times rotation squared (kg).
     x : (n,) array
-        Nodes, metres forward of the gimbal plane; between them displacement is linear in the integrals over mass.
+        Nodes, metres forward of the gimbal plane; between them displacement and rotation are linear where they are
+        integrated over mass.
     displacement : (k, n) array
         1.
     rotation : (k, n) array
@@ -43,33 +44,42 @@ class BeamModes:
 
 @dataclass(frozen=True, eq=False)
 class FreeBeam:
-    """Stiffness of a free beam for displacements; rotations follow them statically.
-
-    Stiffness is exact for static loads at the nodes, with bending and shear stiffness varying inside the elements.
+    """Flexibility of a beam and its rotary inertia; rotations follow displacements statically.
 
     Attributes
     ----------
     x : (n,) array
         Nodes, metres forward of the gimbal plane.
-    stiffness : (n, n) array
-        N/m.
+    flexibility : (n, n) array
+        Displacements by forces, clamped at the aft end (m/N).
     turn : (n, n) array
         Rotations by displacements (1/m).
+    rotary : (n, n) array
+        Mass matrix of the sections' rotary inertia, by displacements (kg).
+    gimbal_station : float
+        m.
     """
 
     x: NDArray[np.float64]
-    stiffness: NDArray[np.float64]
+    flexibility: NDArray[np.float64]
     turn: NDArray[np.float64]
+    rotary: NDArray[np.float64]
+    gimbal_station: float
 
     @classmethod
     def of(cls, construction: Construction, edges: ArrayLike) -> FreeBeam:
         """Assemble the beam between edges (n,), metres forward of the gimbal plane."""
         x = np.asarray(edges, dtype=float)
-        full = _stiffness_matrix(construction.stiffness, x + construction.gimbal_station)
-        ww, wr, rr = full[::2, ::2], full[::2, 1::2], full[1::2, 1::2]
-        turn = -cho_solve(cho_factor(rr), wr.T)
-        condensed = ww + wr @ turn
-        return cls(x, 0.5 * (condensed + condensed.T), turn)
+        elements = element_flexibilities(construction.stiffness, x + construction.gimbal_station)
+        turn = static_rotations(elements, x)
+        rotary = turn.T @ _line_matrix(rotary_line(construction, x)) @ turn
+        return cls(x, cantilever_flexibility(elements, x), turn, 0.5 * (rotary + rotary.T), construction.gimbal_station)
+
+    def product(
+        self, element_masses: NDArray[np.float64], first: NDArray[np.float64], second: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Return the integrals of mass times displacements (j, n) and (k, n), rotations included: (j, k) in kg."""
+        return first @ (_line_matrix(element_masses) + self.rotary) @ second.T
 
     def eigenmodes(
         self, element_masses: NDArray[np.float64], count: int
@@ -79,8 +89,18 @@ class FreeBeam:
             raise ModeError(
                 f"{element_masses.size} beam elements have {self.x.size - 2} modes, not {count}; ask for fewer"
             )
-        squared, shapes = eigh(self.stiffness, _line_matrix(element_masses), subset_by_index=(2, count + 1))
-        return np.sqrt(squared), shapes.T
+        empty = np.flatnonzero((element_masses[:-1] <= 0) & (element_masses[1:] <= 0))
+        if empty.size:
+            begin, end = self.x[empty[0]] + self.gimbal_station, self.x[empty[0] + 2] + self.gimbal_station
+            raise ModeError(f"no mass lies between {begin:g} and {end:g} m; spread one over these stations")
+        # L^T G L with M = L L^T, rigid-body motion taken out of loads and displacements: eigenvalues 1 / omega^2
+        lower = cholesky(_line_matrix(element_masses) + self.rotary, lower=True)
+        rigid, _ = np.linalg.qr(lower.T @ np.column_stack([np.ones(self.x.size), self.x]))
+        loose = lower - (lower @ rigid) @ rigid.T
+        last = self.x.size - 1
+        inverse, vectors = eigh(loose.T @ self.flexibility @ loose, subset_by_index=(last + 1 - count, last))
+        shapes = solve_triangular(lower.T, vectors[:, ::-1])
+        return inverse[::-1] ** -0.5, shapes.T
 
     def scaled(
         self, frequency: NDArray[np.float64], shapes: NDArray[np.float64], time: float | None = None
@@ -103,8 +123,9 @@ def beam_modes(
 ) -> BeamModes:
     """Return the lowest bending modes of a vehicle.
 
-    Mass is uniform in an element and moves as the straight line between its nodes: the modes carry no momentum and no
-    angular momentum, so that sums over elements close. Sections have no rotary inertia.
+    Stiffness is exact for static loads at the nodes, with bending and shear stiffness varying inside the elements.
+    Mass and rotary inertia are uniform in an element and move as the straight line between its nodes: modes carry no
+    momentum and no angular momentum, so that sums over elements close.
 
     Parameters
     ----------
@@ -127,59 +148,7 @@ def beam_modes(
     return beam.scaled(*beam.eigenmodes(np.asarray(element_masses, dtype=float), count), time)
 
 
-def mass_product(
-    element_masses: NDArray[np.float64], first: NDArray[np.float64], second: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Return the integrals of mass times displacements (j, n) and (k, n), of shape (j, k) (kg)."""
-    return first @ _line_matrix(element_masses) @ second.T
-
-
 def _line_matrix(masses: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the mass matrix of displacements that are linear between nodes."""
+    """Return the mass matrix of nodal values that are linear between nodes."""
     diagonal = (np.append(masses, 0.0) + np.insert(masses, 0, 0.0)) / 3
     return np.diag(diagonal) + np.diag(masses / 6, 1) + np.diag(masses / 6, -1)
-
-
-def _stiffness_matrix(stiffness: Stiffness, station: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the matrix for (displacement, rotation) at each node.
-
-    An element clamped at its aft node has the flexibility [[int y^2/EI + int 1/kGA, int y/EI], [., int 1/EI]] at its
-    forward node, y measured aft from there; equilibrium gives the rest.
-    """
-    matrix = np.zeros((2 * station.size, 2 * station.size))
-    for i, (a, b) in enumerate(pairwise(station)):
-        y0, y1, y2, shear = _flexibility(stiffness, a, b)
-        relative = np.array([[-1.0, -(b - a), 1.0, 0.0], [0.0, -1.0, 0.0, 1.0]])
-        element = relative.T @ np.linalg.solve([[y2 + shear, y1], [y1, y0]], relative)
-        matrix[2 * i : 2 * i + 4, 2 * i : 2 * i + 4] += element
-    return matrix
-
-
-_GAUSS_POINTS, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(6)
-
-
-def _flexibility(stiffness: Stiffness, a: float, b: float) -> tuple[float, float, float, float]:
-    """Return the integrals of 1/EI, y/EI, y^2/EI and 1/kGA over an element, piece by piece between jumps."""
-    inside = stiffness.station[(stiffness.station > a) & (stiffness.station < b)]
-    cuts = np.concatenate([[a], np.unique(inside), [b]])
-    total = np.zeros(4)
-    for begin, end in pairwise(cuts):
-        s = 0.5 * (begin + end) + 0.5 * (end - begin) * _GAUSS_POINTS
-        weight = 0.5 * (end - begin) * _GAUSS_WEIGHTS
-        bending, shear = stiffness_at(stiffness, s)
-        y = b - s
-        total += [np.sum(weight * f) for f in (1 / bending, y / bending, y**2 / bending, 1 / shear)]
-    return float(total[0]), float(total[1]), float(total[2]), float(total[3])
-
-
-def stiffness_at(stiffness: Stiffness, station: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return bending (N m2) and shear stiffness (N) at stations (m), logarithmic between the given ones."""
-    s = np.asarray(station, dtype=float)
-    i = np.clip(np.searchsorted(stiffness.station, s, side="right") - 1, 0, stiffness.station.size - 2)
-    i = np.where(stiffness.station[i + 1] > stiffness.station[i], i, i - 1)  # at a jump that ends the beam
-    share = (s - stiffness.station[i]) / (stiffness.station[i + 1] - stiffness.station[i])
-    values = [
-        np.exp((1 - share) * np.log(column[i]) + share * np.log(column[i + 1]))
-        for column in (stiffness.bending, stiffness.shear)
-    ]
-    return values[0], values[1]

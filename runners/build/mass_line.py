@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...model.construction import Construction
+from ...model.construction.structure import LumpedMass
 from ...model.construction.tank_shape import TankShape
 from .mass_properties import require_known_tanks
 
@@ -59,18 +60,45 @@ def mass_line(construction: Construction, edges: ArrayLike, liquid: Mapping[str,
         More liquid than the tank holds.
     """
     require_known_tanks(construction, liquid)
-    station = np.asarray(edges, dtype=float) + construction.gimbal_station
-    # an edge may differ from the vehicle's end by rounding
-    station[0], station[-1] = min(station[0], construction.aft_end), max(station[-1], construction.forward_end)
+    station = _stations(construction, edges)
     below = np.zeros(station.size)
     for item in construction.masses:
-        if item.end > item.begin:
-            below += item.mass * np.clip((station - item.begin) / (item.end - item.begin), 0.0, 1.0)
-        else:
-            element = min(int(np.searchsorted(station, item.begin, side="right")) - 1, station.size - 2)
-            below[element + 1 :] += item.mass
+        below += item.mass * _share_below(item, station)
     for tank in construction.tanks:
         shape = TankShape.of(tank)
         level = shape.level(np.asarray(liquid.get(tank.name, tank.liquid), dtype=float) / tank.density)
         below = below + tank.density * shape.volume(np.minimum(station, level[..., None]))
     return np.diff(below)
+
+
+def rotary_line(construction: Construction, edges: ArrayLike) -> NDArray[np.float64]:
+    """Return the rotary inertia of the sections in each element (n,), kg m2, about a lateral axis through each section.
+
+    A mass of radius of gyration r has mass r^2 / 2; liquid has none (``mass_properties``).
+
+    Parameters
+    ----------
+    construction : Construction
+    edges : (n + 1,) array
+        Metres forward of the gimbal plane.
+    """
+    station = _stations(construction, edges)
+    below = np.zeros(station.size)
+    for item in construction.masses:
+        below += 0.5 * item.mass * item.radius**2 * _share_below(item, station)
+    return np.diff(below)
+
+
+def _stations(construction: Construction, edges: ArrayLike) -> NDArray[np.float64]:
+    station = np.asarray(edges, dtype=float) + construction.gimbal_station
+    # an edge may differ from the vehicle's end by rounding
+    station[0], station[-1] = min(station[0], construction.aft_end), max(station[-1], construction.forward_end)
+    return station
+
+
+def _share_below(item: LumpedMass, station: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the share of a mass aft of stations; a point mass on an edge belongs to the element forward of it."""
+    if item.end > item.begin:
+        return np.clip((station - item.begin) / (item.end - item.begin), 0.0, 1.0)
+    element = min(int(np.searchsorted(station, item.begin, side="right")) - 1, station.size - 2)
+    return (np.arange(station.size) > element).astype(float)

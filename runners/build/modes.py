@@ -12,7 +12,7 @@ from scipy.optimize import linear_sum_assignment
 
 from ...model.construction import Construction
 from ...model.errors import ModeError
-from .beam import FreeBeam, mass_product
+from .beam import FreeBeam
 from .mass_line import beam_edges, mass_line
 
 _SPARE_MODES = 3  # beyond those asked for: one of them may cross into the range
@@ -89,8 +89,8 @@ def followed_modes(
     def follow(shapes: NDArray[np.float64], before: float, now: float, halvings: int) -> _Step:
         masses = masses_at(now)
         frequency, candidates = beam.eigenmodes(masses, count + _SPARE_MODES)
-        own = np.diag(mass_product(masses, shapes, shapes))
-        alike = mass_product(masses, shapes, candidates) ** 2 / own[:, None]
+        own = np.diag(beam.product(masses, shapes, shapes))
+        alike = beam.product(masses, shapes, candidates) ** 2 / own[:, None]
         rows, columns = linear_sum_assignment(-alike)
         likeness = alike[rows, columns]
         if likeness.min() >= _LEAST_LIKENESS:

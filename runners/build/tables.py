@@ -10,13 +10,11 @@ from numpy.typing import NDArray
 from ...model.station_loads import ARGUMENTS
 from ...model.vehicle_file import VehicleFile
 from .loads import load_columns, local_load_columns
-from .mean_flight import EVENT_MARGIN
 from .vehicle_numbers import VehicleNumbers
 
 Array = NDArray[np.float64]
 Columns = dict[tuple[str, str], Array]
 
-ALONG_SPACING = 2.0  # s, of the loads along the vehicle: many stations
 DIGITS = 9
 
 
@@ -79,7 +77,7 @@ def vehicle_tables(numbers: VehicleNumbers, file: VehicleFile) -> dict[str, tupl
         tables[file.tables.local_aerodynamics.file] = note, time | _local_integrals(numbers)
     if file.tables.loads_along_vehicle is not None:
         note = "coefficients of the bending moment at stations along the whole vehicle"
-        tables[file.tables.loads_along_vehicle.file] = note, _along(numbers)
+        tables[file.tables.loads_along_vehicle.file] = note, _along(numbers, file.start_time_s)
     return tables
 
 
@@ -134,20 +132,17 @@ def _local_load(numbers: VehicleNumbers, station: int) -> Columns:
     return {key: np.array([row[key][station] for row in rows]) for key in rows[0]}
 
 
-def _along(numbers: VehicleNumbers) -> Columns:
-    """Return the loads of all stations, time by time, at ``ALONG_SPACING`` and beside events."""
+def _along(numbers: VehicleNumbers, start: float) -> Columns:
+    """Return the loads of all stations, time by time from the last row before the start of the model on."""
     times, stations = numbers.flight.time, numbers.stations
-    wanted = np.abs(times / ALONG_SPACING - np.round(times / ALONG_SPACING)) < 1e-9
-    for event in numbers.flight.events.values():
-        wanted |= np.abs(times - event) < 1.5 * EVENT_MARGIN
-    wanted[[0, -1]] = True
-    rows = np.flatnonzero(wanted)
+    times = times[max(0, int(np.searchsorted(times, start, side="right")) - 1) :]
     gimbal = numbers.construction.gimbal_station
-    arguments = dict.fromkeys((name, unit) for name, unit, _ in ARGUMENTS)
-    values = (np.repeat(times[rows], stations.size), *(np.tile(x, rows.size) for x in (stations + gimbal, stations)))
+    values = (np.repeat(times, stations.size), *(np.tile(x, times.size) for x in (stations + gimbal, stations)))
+    arguments = {(name, unit): value for (name, unit, _), value in zip(ARGUMENTS, values, strict=True)}
     by_station = [_load(numbers, s) | _local_load(numbers, s) for s in range(stations.size)]
-    columns = {key: np.array([found[key][rows] for found in by_station]).T.ravel() for key in by_station[0]}
-    return dict(zip(arguments, values, strict=True)) | columns
+    return arguments | {
+        key: np.array([found[key][-times.size :] for found in by_station]).T.ravel() for key in by_station[0]
+    }
 
 
 def _local_integrals(numbers: VehicleNumbers) -> Columns:

@@ -25,7 +25,6 @@ log = logging.getLogger(__name__)
 CONNECT_SECONDS = 10.0
 WORKER_SECONDS = 60.0  # how long a cluster may be without workers
 LOOK_SECONDS = 2.0
-RETRIES = 2  # of a chunk whose worker was lost, member by member
 UNDER_WAY = 4  # chunks for each thread of the cluster
 
 Compute = Callable[[Study, Task, Chunk], ChunkResult]
@@ -40,8 +39,8 @@ def compute_on_cluster(
 ) -> Generator[tuple[Chunk, ChunkResult], None, None]:
     """Yield chunks as they are done, in any order.
 
-    A chunk whose worker dies is tried again, member by member, so that one that kills its worker is found; its
-    result says so.
+    A chunk whose workers died (as often as the scheduler's ``allowed-failures``) is tried again at the end, member by
+    member, so that one that kills its worker is found; its result says so.
 
     Parameters
     ----------
@@ -61,10 +60,10 @@ def compute_on_cluster(
     client = _connect(distributed, address)
     try:
         yield from _Dispatch(distributed, client, address, study, task, packed, compute).run(list(missing))
-    except (distributed.CancelledError, distributed.comm.CommClosedError, OSError) as error:
+    except (distributed.CancelledError, distributed.comm.CommClosedError, OSError):
         raise SchedulerError(
-            f"the connection to the scheduler at {address} was lost ({error}); stored members stay: start the cluster "
-            "again and run the same command"
+            f"the connection to the scheduler at {address} was lost; stored members stay: start the cluster again "
+            "and run the same command"
         ) from None
     finally:
         client.close(timeout=LOOK_SECONDS)
@@ -114,37 +113,40 @@ class _Dispatch:
         # a task, not scattered data: a cluster can make it again when the worker that held it is lost
         self.vehicle = client.submit(bytes, packed, key=f"ascentwind-vehicle-{self.key[:16]}", priority=10)
         self.identity = _identity(study)
-        self.lost: dict[str, int] = {}
         self.warned = False
 
     def run(self, waiting: list[Chunk]) -> Generator[tuple[Chunk, ChunkResult], None, None]:
-        running: dict[Any, tuple[Chunk, Chunk]] = {}
-        pieces: dict[str, dict[int, ChunkResult]] = {}
-        queue = [(chunk, chunk) for chunk in reversed(waiting)]
+        killed = []
+        for chunk, result in self._flow(waiting, at_once=True):
+            if result is None:
+                killed.append(chunk)
+            else:
+                yield chunk, result
+        for chunk in sorted(killed, key=lambda c: c.first):
+            log.warning("members %s lost their workers; they are tried again one by one", chunk.name)
+            members = [Chunk(chunk.first + k, chunk.values[k : k + 1]) for k in range(len(chunk.values))]
+            alone = dict(self._flow(members, at_once=False))
+            died = empty_result(self.study, self.task, 1, "its worker died at every attempt")
+            yield chunk, _joined([alone[member] or died for member in members])
+
+    def _flow(self, waiting: list[Chunk], at_once: bool) -> Generator[tuple[Chunk, ChunkResult | None], None, None]:
+        """Yield chunks as they are done, None for one that lost its workers.
+
+        Alone on the cluster a chunk cannot be blamed for the death of a worker that it shared with another.
+        """
+        queue, running = waiting[::-1], {}
         seen = time.monotonic()
         while queue or running:
-            while queue and len(running) < UNDER_WAY * max(1, self._threads()):
-                whole, part = queue.pop()
-                running[self._submit(part)] = (whole, part)
+            while queue and len(running) < (UNDER_WAY * max(1, self._threads()) if at_once else 1):
+                chunk = queue.pop()
+                running[self._submit(chunk, alone=not at_once)] = chunk
             done = self._done(list(running))
             if self._threads():
                 seen = time.monotonic()
             elif time.monotonic() - seen > WORKER_SECONDS:
                 raise SchedulerError(_no_workers(self.address, WORKER_SECONDS))
             for future in done:
-                whole, part = running.pop(future)
-                result, again = self._result(future, part)
-                if again:
-                    queue += [(whole, one) for one in reversed(again)]
-                    continue
-                assert result is not None
-                if part is whole:
-                    yield whole, result
-                    continue
-                found = pieces.setdefault(whole.name, {})
-                found[part.first] = result
-                if len(found) == len(whole.values):
-                    yield whole, _joined([found[k] for k in sorted(found)])
+                yield running.pop(future), self._result(future)
 
     def _done(self, running: list[Any]) -> set[Any]:
         """Wait for a chunk, but not for ever."""
@@ -155,34 +157,27 @@ class _Dispatch:
             return set()
 
     def _threads(self) -> int:
-        return sum(w["nthreads"] for w in self.client.scheduler_info(n_workers=-1)["workers"].values())
+        if self.client.status == "closed":
+            raise OSError("it does not answer")
+        workers = self.client.scheduler_info(n_workers=-1).get("workers", {})
+        return sum(worker["nthreads"] for worker in workers.values())
 
-    def _submit(self, chunk: Chunk) -> Any:
-        return self.client.submit(
-            work, self.vehicle, self.key, self.task, chunk, self.compute, pure=False, key=self._name(chunk)
-        )
+    def _submit(self, chunk: Chunk, alone: bool) -> Any:
+        key = f"ascentwind-{self.key[:8]}-{id(self)}-{chunk.name}{'-alone' if alone else ''}"
+        return self.client.submit(work, self.vehicle, self.key, self.task, chunk, self.compute, pure=False, key=key)
 
-    def _name(self, chunk: Chunk) -> str:
-        return f"ascentwind-{self.key[:8]}-{id(self)}-{chunk.name}-{self.lost.get(chunk.name, 0)}"
-
-    def _result(self, future: Any, chunk: Chunk) -> tuple[ChunkResult | None, list[Chunk]]:
-        """Return the result of a chunk, or the members to try again."""
+    def _result(self, future: Any) -> ChunkResult | None:
+        """Return the result of a chunk, None if its workers died."""
         try:
             result, identity = future.result()
         except self.distributed.KilledWorker:
-            count = self.lost[chunk.name] = self.lost.get(chunk.name, 0) + 1
-            if len(chunk.values) > 1:
-                log.warning("members %s lost their worker; they are tried one by one", chunk.name)
-                return None, [Chunk(chunk.first + k, chunk.values[k : k + 1]) for k in range(len(chunk.values))]
-            if count <= RETRIES:
-                return None, [chunk]
-            return empty_result(self.study, self.task, 1, "its worker died at every attempt"), []
+            return None
         except (ImportError, AttributeError) as error:
             raise SchedulerError(
                 f"a worker cannot load what it is sent ({error}); install this ascentwind there"
             ) from None
         self._compare(identity)
-        return result, []
+        return result
 
     def _compare(self, identity: dict[str, str]) -> None:
         """Refuse results of another program, and say when another processor may change last digits."""

@@ -53,7 +53,7 @@ def histogram_figure(result: ParameterStudy, measured: xr.Dataset, found: xr.Dat
         top = density.get_ylim()[1]
         density.set_ylim(0, 1.25 * top)
         density.legend(fontsize=9, loc="upper right")
-        cumulative.legend(fontsize=9, loc="upper left")
+        cumulative.legend(fontsize=9, loc="lower right")
         figure.suptitle(f"{result.plan.title}\nPeak of mean + 3σ {words(response)}")
     return figure
 

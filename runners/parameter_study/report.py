@@ -147,14 +147,14 @@ def _print_spread(found: xr.Dataset, console: Console) -> None:
         title = f"{words(response).capitalize()} ({display(unit)[1]}) of {found.attrs['members']} members"
         table = Table(title=f"{title}, below with 95 % intervals")
         table.add_column("of", no_wrap=True)
-        for column in ("nominal", "mean", "σ", "σ, first order", "ratio", "5 %", "95 %", "99 %"):
+        for column in ("nominal", "mean", "σ", "first order σ", "ratio", "95 %", "99 %"):
             table.add_column(column, justify="right", no_wrap=True)
         for measure in _names(found, "measure"):
             at = part.sel(measure=measure)
             numbers = {name: _shown(at[name].item(), unit, 3) for name in found.data_vars if at[name].ndim == 0}
             ranked = [
                 _interval(*(_shown(at[f"percentile{e}"].sel(percent=p).item(), unit, 3) for e in ("", "_low", "_high")))
-                for p in (5.0, 95.0, 99.0)
+                for p in (95.0, 99.0)
             ]
             table.add_row(
                 LABELS[measure] if measure == PEAK else f"{LABELS[measure]} at {time:g} s",
