@@ -13,8 +13,11 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ..model.construction.construction_file import CONSTRUCTION_FILE, load_construction
+from ..model.construction.tank_shape import TankShape
 from ..model.errors import TimeRangeError
 from ..model.station_loads import load_station_loads
+from ..model.vehicle import Vehicle
 from .figures import COLORS, STYLE, display, words, write_figure
 from .moments_along_vehicle import moments_along_vehicle
 from .output import write_whole
@@ -59,22 +62,17 @@ def write_along_vehicle(study: Study, times: list[float], time: float | None, fo
     folder : Path
         Made and writable.
     """
+    assert study.vehicle is not None  # moments_along_vehicle needs one
     found = moments_along_vehicle(study, sorted({*times, *([] if time is None else [time])}))
     if time is None:
         largest = _largest(found).max("station")
         time = float(found["time"].values[int(np.argmax(largest.values))])
     text = along_csv(found)
-    title = study.vehicle.title if study.vehicle else study.system.name
     return [
         write_whole(folder / f"{NAME}.nc", lambda p: found.to_netcdf(p, engine="scipy")),
         write_whole(folder / f"{NAME}.csv", lambda p: p.write_text(text)),
-        *write_figure(along_figure(found, time, load_stations(study), title), folder, NAME),
+        *write_figure(along_figure(found, time, study.vehicle), folder, NAME),
     ]
-
-
-def load_stations(study: Study) -> list[float]:
-    """Return the vehicle stations whose bending moment is an output, m."""
-    return [load.station_m for load in study.vehicle.file.loads] if study.vehicle else []
 
 
 def along_csv(found: xr.Dataset) -> str:
@@ -92,38 +90,51 @@ def along_csv(found: xr.Dataset) -> str:
     return buffer.getvalue()
 
 
-def along_figure(found: xr.Dataset, time: float, stations: list[float], title: str) -> Figure:
+def along_figure(found: xr.Dataset, time: float, vehicle: Vehicle) -> Figure:
     """Return the moment over the stations at a time, its envelope over the flight, and both times and stations."""
     factor, unit = display("N m", found["mean_plus_3sigma"].values)
-    several = found.sizes["time"] > 1
+    panels = 3 if found.sizes["time"] > 1 else 1
     with rc_context(STYLE):
-        figure = Figure(figsize=(8.5, 11.0 if several else 4.8), layout="constrained")
-        panels = figure.subplots(3 if several else 1, sharex=True, squeeze=False)[:, 0]
-        _section(panels[0], found.sel(time=time), factor)
-        panels[0].set_title(f"at {time:g} s", loc="left")
-        if several:
-            _envelope(panels[1], found, factor)
+        figure = Figure(figsize=(8.5, 1.2 + 3.5 * panels), layout="constrained")
+        outline, *axes = figure.subplots(1 + panels, sharex=True, height_ratios=[0.18, *[1] * panels])
+        _tanks(outline, vehicle.folder)
+        _section(axes[0], found.sel(time=time), factor)
+        axes[0].set_title(f"at {time:g} s", loc="left")
+        if panels > 1:
+            _envelope(axes[1], found, factor)
             begin, end = found["time"].values[[0, -1]]
-            panels[1].set_title(f"envelope from {begin:g} to {end:g} s", loc="left")
-            largest = factor * _largest(found)
-            mesh = panels[2].pcolormesh(
-                found["station"], found["time"], largest, shading="gouraud", cmap="viridis", rasterized=True
+            axes[1].set_title(f"envelope from {begin:g} to {end:g} s", loc="left")
+            mesh = axes[2].pcolormesh(
+                found["station"], found["time"], factor * _largest(found), shading="gouraud", rasterized=True
             )
-            figure.colorbar(mesh, ax=panels[2], label=f"|mean| + 3σ ({unit})", pad=0.01)
-            panels[2].axhline(time, color="white", lw=0.8, ls=":")
-            panels[2].grid(False)
-            panels[2].set_ylabel("flight time (s)")
-            panels[2].set_title("over station and time", loc="left")
-        for axes in panels[:2]:
-            axes.axhline(0, color="black", lw=0.6)
-            axes.set_ylabel(f"bending moment ({unit})")
-            axes.margins(x=0)
-            for n, station in enumerate(stations):
-                axes.axvline(station, color="black", lw=0.8, ls=":", label=None if n else "load station of the outputs")
-            axes.legend()
-        panels[-1].set_xlabel("vehicle station, forward to the right (m)")
-        figure.suptitle(f"{title}\nBending moment along the vehicle, with its answer to slosh")
+            figure.colorbar(mesh, ax=axes[2], label=f"|mean| + 3σ ({unit})", pad=0.01)
+            axes[2].axhline(time, color="white", lw=0.8, ls=":")
+            axes[2].grid(False)
+            axes[2].set_ylabel("flight time (s)")
+        for panel in axes[:2]:
+            panel.axhline(0, color="black", lw=0.6)
+            panel.set_ylabel(f"bending moment ({unit})")
+            panel.margins(x=0)
+            for n, load in enumerate(vehicle.file.loads):
+                label = None if n else "load station of the outputs"
+                panel.axvline(load.station_m, color="black", lw=0.8, ls=":", label=label)
+            panel.legend()
+        axes[-1].set_xlabel("vehicle station, forward to the right (m)")
+        figure.suptitle(f"{vehicle.title}\nBending moment along the vehicle, with its answer to slosh")
     return figure
+
+
+def _tanks(axes: Axes, folder: Path) -> None:
+    """Draw the tanks of a vehicle whose construction is in its folder."""
+    axes.axis("off")
+    if not (folder / CONSTRUCTION_FILE).is_file():
+        return
+    for tank in load_construction(folder).tanks:
+        shape = TankShape.of(tank)
+        station = np.linspace(shape.edges[0], shape.edges[-1], 200)
+        axes.fill_between(station, -shape.radius(station), shape.radius(station), color="grey", alpha=0.45, lw=0)
+        middle = 0.5 * (station[0] + station[-1])
+        axes.text(middle, 0, words(tank.name).replace(" ", "\n"), fontsize=7, ha="center", va="center")
 
 
 def _section(axes: Axes, part: xr.Dataset, factor: float) -> None:
@@ -148,4 +159,4 @@ def _envelope(axes: Axes, found: xr.Dataset, factor: float) -> None:
 
 def _largest(found: xr.Dataset) -> xr.DataArray:
     """Return |mean| + 3 sigma from all sources, (time, station)."""
-    return np.abs(found["mean"]) + 3 * found["std"].sel(source=COMBINED)
+    return abs(found["mean"]) + 3 * found["std"].sel(source=COMBINED)

@@ -17,6 +17,7 @@ from ascentwind.model.errors import (
     UnknownNameError,
     UnstableSystemWarning,
 )
+from ascentwind.model.shipped import built_in_vehicles
 from ascentwind.model.vehicle import load_vehicle
 from ascentwind.runners import IntegratorOptions, Study
 from ascentwind.runners.cli import main
@@ -25,19 +26,28 @@ from ascentwind.runners.output import prepare_folder
 from ascentwind.runners.times import parse_times
 
 RIGID = "rigid_body.csv"
+
+
+def second_cell(file: str, time: str) -> str:
+    """Return what a shipped table holds beside a time."""
+    lines = (built_in_vehicles()["as504"] / file).read_text().splitlines()
+    return next(line.split(",")[1] for line in lines if line.startswith(f"{time},"))
+
+
+MASS, MASS_100, ALTITUDE = second_cell(RIGID, "2"), second_cell(RIGID, "100"), second_cell("trajectory.csv", "60")
 # (file, what is replaced, by what, what the message must hold)
 SPOILED = [
     pytest.param(RIGID, "moment_of_inertia", "moment_of_inertai", r"rigid_body.csv: column 'moment_of_inertia \[kg m2\]' is missing; did you mean 'moment_of_inertai'", id="missing column"),
     pytest.param(RIGID, "mass [kg]", "mass [lb]", r"rigid_body.csv, column 'mass': unit is \[lb\], expected \[kg\]; convert", id="wrong unit"),
     pytest.param(RIGID, "mass [kg]", "mass", r"rigid_body.csv, line 3: header 'mass' has no unit; write it as", id="no unit"),
     pytest.param(RIGID, "mass [kg]", "mass [kg],mass [kg]", r"column 'mass', line 3: stands twice", id="column twice"),
-    pytest.param(RIGID, "\n2,", "\n0.5,", r"rigid_body.csv, column 'time', line 6: 0.5 comes after 1; sort the rows", id="unsorted"),
-    pytest.param(RIGID, "\n2,", "\n1,", r"rigid_body.csv, column 'time', line 6: 1 repeats the row above", id="repeated"),
-    pytest.param(RIGID, "\n1,2902920,", "\n1,nan,", r"rigid_body.csv, column 'mass', line 5: 'nan' is not a finite number", id="NaN"),
-    pytest.param(RIGID, "\n1,2902920,", "\n1,,", r"rigid_body.csv, column 'mass', line 5: '' is not a finite number", id="empty cell"),
-    pytest.param(RIGID, "\n1,2902920,", "\n1,-2902920,", r"rigid_body.csv, column 'mass', line 5: -2.90292e\+06 is not positive", id="negative mass"),
-    pytest.param(RIGID, "\n1,2902920,", "\n1,5,2902920,", r"rigid_body.csv, line 5: has 5 cells where the header has 4", id="extra cell"),
-    pytest.param("slosh_sic_lox.csv", "mass [kg]", "mass [kg],level [m]", r"line 3: has 4 cells", id="header longer than rows"),
+    pytest.param(RIGID, "\n2,", "\n0.5,", r"rigid_body.csv, column 'time', line 5: 0.5 comes after 1; sort the rows", id="unsorted"),
+    pytest.param(RIGID, "\n2,", "\n1,", r"rigid_body.csv, column 'time', line 5: 1 repeats the row above", id="repeated"),
+    pytest.param(RIGID, f"\n2,{MASS},", "\n2,nan,", r"rigid_body.csv, column 'mass', line 5: 'nan' is not a finite number", id="NaN"),
+    pytest.param(RIGID, f"\n2,{MASS},", "\n2,,", r"rigid_body.csv, column 'mass', line 5: '' is not a finite number", id="empty cell"),
+    pytest.param(RIGID, f"\n2,{MASS},", f"\n2,-{MASS},", r"rigid_body.csv, column 'mass', line 5: -2.88047e\+06 is not positive", id="negative mass"),
+    pytest.param(RIGID, f"\n2,{MASS},", f"\n2,5,{MASS},", r"rigid_body.csv, line 5: has 5 cells where the header has 4", id="extra cell"),
+    pytest.param("slosh_sic_lox.csv", "mass [kg]", "mass [kg],level [m]", r"line 4: has 4 cells", id="header longer than rows"),
     pytest.param("vehicle.toml", 'file = "rigid_body.csv"', 'file = "rigid.csv"', r"rigid.csv: cannot be read \(No such file", id="missing file"),
     pytest.param("vehicle.toml", "start_time_s = 10.0", "start_time_s = 0.5", r"vehicle.toml, column 'start_time_s': start_time_s = 0.5 lies before the first row of \w+.csv at 1 s", id="start before tables"),
     pytest.param("vehicle.toml", "start_time_s = 10.0", "start_time_s = 200.0", r"start_time_s = 200 is not before the end of \w+.csv at 150 s", id="start after end"),
@@ -55,8 +65,8 @@ SPOILED = [
     pytest.param("vehicle.toml", "value = [0.651,", "value = [1.651,", r"short_fraction between 0 and 1", id="fraction above one"),
     pytest.param("vehicle.toml", "format = 1", "format = [", r"vehicle.toml: is not valid TOML", id="broken TOML"),
     pytest.param("wind_march_zonal.csv", "1000,2.64,6.85", "1000,2.64,-6.85", r"column 'standard_deviation', line 5: -6.85 is not positive", id="negative sigma"),
-    pytest.param("trajectory.csv", "\n60,5992.99,", "\n60,7992.99,", r"trajectory.csv, column 'altitude', t = 6[01][.\d]* s: does not increase", id="altitude falls"),
-    pytest.param(RIGID, "\n100,1584150,", "\n100,1e12,", r"rigid_body.csv, column 'mass', t = [\d.]+ s: the interpolation between rows is not positive.*pchip", id="overshoot"),
+    pytest.param("trajectory.csv", f"\n60,{ALTITUDE},", "\n60,7992.99,", r"trajectory.csv, column 'altitude', t = 6[01][.\d]* s: does not increase", id="altitude falls"),
+    pytest.param(RIGID, f"\n100,{MASS_100},", "\n100,1e12,", r"rigid_body.csv, column 'mass', t = [\d.]+ s: the interpolation between rows is not positive.*pchip", id="overshoot"),
 ]  # fmt: skip
 
 
@@ -73,7 +83,7 @@ def test_table_that_ends_before_the_time_asked_for(vehicle_folder):
     lines = path.read_text().splitlines()
     path.write_text("\n".join(line for line in lines if not re.match(r"(1[0-9][0-9]|9[0-9])", line)) + "\n")
     study = Study.load(vehicle_folder, compile=False)
-    with pytest.raises(TimeRangeError, match="end time 100 s lies beyond the last row of bending_1.csv at 87.5 s"):
+    with pytest.raises(TimeRangeError, match="end time 100 s lies beyond the last row of bending_1.csv at 89 s"):
         study.response_statistics([100.0])
 
 

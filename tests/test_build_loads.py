@@ -33,10 +33,14 @@ def vehicle() -> LoadedVehicle:
     shapes, rotations = np.array(shapes), np.array(rotations)
     x = line.points
     rigid = np.array([np.ones_like(x), x])
-    gram = np.array([[line.total(mass * a * b) for b in rigid] for a in rigid])
+    turned = np.array([np.zeros_like(x), np.ones_like(x)])
+    gram = np.array([[line.total(mass * a * b + rotary * p * q) for b, q in zip(rigid, turned, strict=True)]
+                     for a, p in zip(rigid, turned, strict=True)])  # fmt: skip
     for k in range(2):
-        c = np.linalg.solve(gram, [line.total(mass * a * shapes[k]) for a in rigid])
+        pairs = zip(rigid, turned, strict=True)
+        c = np.linalg.solve(gram, [line.total(mass * a * shapes[k] + rotary * p * rotations[k]) for a, p in pairs])
         shapes[k] -= c @ rigid
+        rotations[k] -= c @ turned
     air = PRESSURE * construction.reference_area * intensity(construction, [1.4], x)[0]
     return LoadedVehicle(line, mass, rotary, air, THRUST, SPEED, shapes, rotations, np.array([4000.0]), np.array([9.0]))
 
@@ -90,8 +94,9 @@ def test_bending_moment_of_a_mode_is_its_inertia_from_either_side(vehicle):
     found = load_coefficients(vehicle, STATIONS).bending
     for k in range(2):
         net = -vehicle.mass * weights * vehicle.displacement[k]
+        couple = -vehicle.rotary_inertia * weights * vehicle.rotation[k]
         for side in (1, -1):
-            expected = [side * ((x - s) * net)[(x - s) * side > 0].sum() for s in STATIONS]
+            expected = [side * ((x - s) * net + couple)[(x - s) * side > 0].sum() for s in STATIONS]
             np.testing.assert_allclose(found[k], expected, atol=1e-10 * np.abs(found[k]).max())
 
 

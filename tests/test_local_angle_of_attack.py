@@ -25,21 +25,13 @@ LOAD = {
 
 
 def switched(folder: Path) -> Path:
-    """Copy AS-504 and name the tables that the option needs."""
+    """Copy AS-504 with full coupling and the option."""
     shutil.copytree(VEHICLE, folder)
     toml = folder / "vehicle.toml"
     text = toml.read_text()
-    entry = '{ file = "FILE", status = "assumed", source = "point forces" }'
-    for old, new in (
-        ("full_coupling = false", "full_coupling = true\nlocal_angle_of_attack = true"),
-        (
-            "[tables.rigid_body]",
-            f"[tables]\nlocal_aerodynamics = {entry.replace('FILE', 'local.csv')}\n\n[tables.rigid_body]",
-        ),
-        ("[loads.table]", f"local = {entry.replace('FILE', 'load.csv')}\n[loads.table]"),
-    ):
-        assert text.count(old) == 1
-        text = text.replace(old, new)
+    for option in ("full_coupling = ", "local_angle_of_attack = "):
+        assert text.count(option + "false") == 1
+        text = text.replace(option + "false", option + "true")
     toml.write_text(text)
     return folder
 
@@ -47,7 +39,7 @@ def switched(folder: Path) -> Path:
 def write(file: Path, columns, values: dict[str, float]) -> None:
     header = ",".join(["time [s]", *(f"{name} [{unit}]" for name, unit, _ in columns)])
     row = ",".join(repr(float(values[name])) for name, _, _ in columns)
-    file.write_text(header + "".join(f"\n{t},{row}" for t in (0, 80, 300)) + "\n")
+    file.write_text(header + "".join(f"\n{t},{row}" for t in (0, 80, 200, 300)) + "\n")
 
 
 @pytest.fixture(scope="module")
@@ -76,8 +68,8 @@ def local(tmp_path_factory, segments) -> Assembled:
         for j in MODES:
             integrals[f"displacement_{i + 1}_displacement_{j + 1}"] = (c * Y[i]) @ Y[j]
             integrals[f"displacement_{i + 1}_slope_{j + 1}"] = (c * Y[i]) @ slope[j]
-    write(folder / "local.csv", local_columns(2), integrals)
-    write(folder / "load.csv", local_load_columns(2), LOAD)
+    write(folder / "local_aerodynamics.csv", local_columns(2), integrals)
+    write(folder / "local_loads_station_25m.csv", local_load_columns(2), LOAD)
     vehicle = load_vehicle(folder)
     system = assemble(vehicle, np.diag([1.0, 3.0, 1.0]))
     return Assembled(vehicle, system, core_functions(system))
@@ -117,17 +109,17 @@ def test_load_takes_the_local_terms(local):
     np.testing.assert_allclose(C[e.outputs.index("bending_moment")], expected, rtol=1e-11, atol=1e-6)
 
 
-def test_missing_tables_are_named(tmp_path):
+@pytest.mark.parametrize(
+    ("begin", "end", "key"),
+    [
+        ("[tables.local_aerodynamics]", "[tables.loads_along", r"tables\.local_aerodynamics"),
+        ("[loads.local]", "# Relative deviations", r"loads\.bending_moment\.local"),
+    ],
+)
+def test_missing_tables_are_named(tmp_path, begin, end, key):
     """The option without its tables is refused, and the message says which command makes them."""
-    folder = tmp_path / "as504"
-    shutil.copytree(VEHICLE, folder)
-    toml = folder / "vehicle.toml"
-    text = toml.read_text().replace("full_coupling = false", "local_angle_of_attack = true")
-    toml.write_text(text)
-    with pytest.raises(DataError, match=r"tables\.local_aerodynamics.*build-vehicle"):
-        load_vehicle(folder)
-    entry = '[tables.local_aerodynamics]\nfile = "local.csv"\nstatus = "assumed"\nsource = ""\n'
-    toml.write_text(text.replace("[tables.rigid_body]", entry + "[tables.rigid_body]"))
-    write(folder / "local.csv", local_columns(2), {name: 1.0 for name, _, _ in local_columns(2)})
-    with pytest.raises(DataError, match=r"loads\.bending_moment\.local.*build-vehicle"):
-        load_vehicle(folder)
+    toml = switched(tmp_path / "as504") / "vehicle.toml"
+    text = toml.read_text()
+    toml.write_text(text[: text.index(begin)] + text[text.index(end) :])
+    with pytest.raises(DataError, match=f"{key}.*build-vehicle"):
+        load_vehicle(toml.parent)

@@ -65,8 +65,8 @@ def test_extra_outputs_are_what_their_names_say(edit, as504):
 def test_further_stations_come_from_data(vehicle_folder, edit):
     """A second load table of half the size is a second output of half the size."""
     rows = (vehicle_folder / "loads_station_25m.csv").read_text().splitlines()
-    halved = [",".join([c.split(",")[0], *(f"{float(x) / 2:.12g}" for x in c.split(",")[1:])]) for c in rows[2:]]
-    (vehicle_folder / "loads_b.csv").write_text("\n".join([*rows[:2], *halved]) + "\n")
+    halved = [",".join([c.split(",")[0], *(f"{float(x) / 2:.12g}" for x in c.split(",")[1:])]) for c in rows[3:]]
+    (vehicle_folder / "loads_b.csv").write_text("\n".join([*rows[:3], *halved]) + "\n")
     entry = (
         '[[loads]]\noutput = "bending_moment_b"\nstation_m = 40.0\n'
         '[loads.table]\nfile = "loads_b.csv"\nstatus = "assumed"\nsource = "half of station 25"\n\n'

@@ -9,8 +9,8 @@ on the free vehicle makes the moment
 
 because the vehicle answers with the accelerations F/m and M/I; mu is the mass per length with all liquid frozen, r the
 rotary inertia per length. At either end L vanishes whatever f is. Coefficients of 4-13: M'_alpha = L[q A c'_N],
-M'_beta = L of the control thrust at the gimbal plane, M'_eta = -int (x - s) mu Y dx (modes are orthogonal to rigid
-motion: nothing answers; sections of the beam have no rotary inertia), M'_xi = -m_k (X_S - s) forward of s.
+M'_beta = L of the control thrust at the gimbal plane, M'_eta = -int (x - s) mu Y + r Y' dx (modes are orthogonal to
+rigid motion: nothing answers), M'_xi = -m_k (X_S - s) forward of s.
 """
 
 from __future__ import annotations
@@ -100,29 +100,29 @@ def load_coefficients(vehicle: LoadedVehicle, stations: NDArray[np.float64]) -> 
     """
     line, mu, r = vehicle.line, vehicle.mass, vehicle.rotary_inertia
     x = line.points
-    mass = line.total(mu)
-    center = line.total(x * mu) / mass
-    inertia = line.total((x - center) ** 2 * mu + r)
+    mass = float(line.total(mu))
+    center = float(line.total(x * mu)) / mass
+    inertia = float(line.total((x - center) ** 2 * mu + r))
 
-    def moment_about_station(force, couple=0.0):
+    def moment_about_station(force: NDArray, couple: NDArray | float = 0.0) -> NDArray:
         return line.forward(x * force + couple, stations) - stations * line.forward(force, stations)
 
     first = moment_about_station(mu)
     second = moment_about_station((x - center) * mu, r)
 
-    def free(density):
+    def free(density: NDArray) -> NDArray:
         lateral, turning = line.total(density)[..., None], line.total((x - center) * density)[..., None]
         return moment_about_station(density) - first * lateral / mass - second * turning / inertia
 
     engine = vehicle.control_thrust * np.where(stations < 0, -stations, 0.0)
     engine += vehicle.control_thrust * (second * center / inertia - first / mass)
-    _refuse_modes_of_other_masses(vehicle, mass, center)
+    _refuse_modes_of_other_masses(vehicle, mass, center, inertia)
     ahead = np.maximum(vehicle.slosh_point[:, None] - stations, 0.0)
     air = vehicle.normal_force
     return LoadCoefficients(
         angle_of_attack=free(air),
         engine_angle=engine,
-        bending=-moment_about_station(mu * vehicle.displacement),
+        bending=-moment_about_station(mu * vehicle.displacement, r * vehicle.rotation),
         slosh=-vehicle.slosh_mass[:, None] * ahead,
         first_moment=first,
         second_moment=second,
@@ -132,13 +132,11 @@ def load_coefficients(vehicle: LoadedVehicle, stations: NDArray[np.float64]) -> 
     )
 
 
-def _refuse_modes_of_other_masses(vehicle: LoadedVehicle, mass: float, center: float) -> None:
-    line, x = vehicle.line, vehicle.line.points
-    moving = vehicle.mass * vehicle.displacement
-    turning = line.total((x - center) * moving)
-    spread = line.total((x - center) ** 2 * vehicle.mass)
+def _refuse_modes_of_other_masses(vehicle: LoadedVehicle, mass: float, center: float, inertia: float) -> None:
+    line, moving = vehicle.line, vehicle.mass * vehicle.displacement
+    turning = line.total((line.points - center) * moving + vehicle.rotary_inertia * vehicle.rotation)
     size = np.sqrt(line.total(moving * vehicle.displacement))
-    left = np.maximum(np.abs(line.total(moving)) / np.sqrt(mass), np.abs(turning) / np.sqrt(spread)) / size
+    left = np.maximum(np.abs(line.total(moving)) / np.sqrt(mass), np.abs(turning) / np.sqrt(inertia)) / size
     if (left > LARGEST_IMBALANCE).any():
         mode = int(np.argmax(left))
         raise DataError(

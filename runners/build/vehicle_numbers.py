@@ -12,7 +12,7 @@ from ...model.construction import Construction
 from . import aerodynamics
 from .line_integrals import Line
 from .loads import LoadCoefficients, LoadedVehicle, load_coefficients
-from .mass_line import mass_line
+from .mass_line import mass_line, rotary_line
 from .mass_properties import MassProperties, mass_properties
 from .mean_flight import MeanFlight, fly
 from .modes import ModeHistory, followed_modes
@@ -105,7 +105,7 @@ def compute_vehicle(
     intensity = aerodynamics.intensity(construction, flight.mach, line.points)
     displacement, rotation = (line.linear(modes.x, shape) for shape in (modes.displacement, modes.rotation))
     mass = line.spread(modes.x, mass_line(construction, modes.x, flight.liquid))
-    rotary = line.spread(modes.x, _rotary_line(construction, modes.x))
+    rotary = line.spread(modes.x, rotary_line(construction, modes.x))
     loads = tuple(
         load_coefficients(
             LoadedVehicle(
@@ -137,16 +137,3 @@ def along_stations(construction: Construction) -> Array:
     step = even[1] - even[0]
     clear = [s for s in even if all(abs(s - load) > 0.1 * step for load in construction.load_stations)]
     return np.sort(np.array([*clear, *construction.load_stations])) - construction.gimbal_station
-
-
-def _rotary_line(construction: Construction, edges: Array) -> Array:
-    """Return the rotary inertia in each element (kg m2): m r^2 / 2 of every mass with a radius of gyration r."""
-    station = edges + construction.gimbal_station
-    found = np.zeros(edges.size - 1)
-    for item in construction.masses:
-        inertia = 0.5 * item.mass * item.radius**2
-        if item.end > item.begin:
-            found += inertia * np.diff(np.clip((station - item.begin) / (item.end - item.begin), 0.0, 1.0))
-        else:
-            found[min(int(np.searchsorted(station, item.begin, side="right")) - 1, found.size - 1)] += inertia
-    return found
