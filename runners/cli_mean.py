@@ -29,7 +29,7 @@ def mean(
         study = Study.load(vehicle)
         found = mean_comparison(study)
     table = Table("response", "linear, peak deg", "at s", "nonlinearity, deg", "at s", "bending and slosh, deg", "at s")
-    degrees = np.rad2deg(found["mean"])
+    degrees = found["mean"] * (180 / np.pi)
     for name in found["response"].values:
         part = degrees.sel(response=name)
         rigid = part.sel(model="linear_rigid")

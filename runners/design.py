@@ -225,6 +225,9 @@ def trade(
     points: list[TradePoint] = []
     start: Mapping[str, float] | None = None
     for limit in sorted(limits, reverse=True):
+        if points and points[-1].result is None:  # a tighter limit cannot be met either
+            points.append(TradePoint(limit, None, points[-1].closest))
+            continue
         try:
             found = design(replace(problem, peak_limits={**problem.peak_limits, response: limit}), start)
             start = found.values

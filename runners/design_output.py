@@ -40,7 +40,7 @@ def print_design(result: DesignResult, verified: Sequence[Verification], console
         )
     console.print(table)
     for name, multiplier in result.stationarity.multipliers:
-        console.print(f"active: {words(name)}, multiplier {multiplier:.3g}", soft_wrap=True, highlight=False)
+        console.print(f"active: {name}, multiplier {multiplier:.3g}", soft_wrap=True, highlight=False)
     console.print(verdict(result, verified), style="green" if good(result, verified) else "bold red", soft_wrap=True)
 
 

@@ -19,7 +19,7 @@ from .sweep_engine import SweepOptions
 if TYPE_CHECKING:
     from .study import Study
 
-TOLERANCE = 1e-9  # of the sweep: far below what a search can tell apart
+TOLERANCE = 1e-10  # of the sweep: noise in a line search is then below what ends it
 SIGNS = (1.0, -1.0)
 
 Row = tuple[str, float, float]  # response, sign of the mean, end time

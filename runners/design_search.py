@@ -275,7 +275,7 @@ def _slsqp(
         bounds=[(0.0, 1.0)] * (z.size - 1) + [(0.0, None)],
         constraints={"type": "ineq", "fun": slack, "jac": slope},
         callback=heard,
-        options={"ftol": 1e-11, "maxiter": ITERATIONS},
+        options={"ftol": 1e-10, "maxiter": ITERATIONS},
     )
     log.debug("SLSQP: %s after %d iterations", found.message, found.nit)
     return found.x

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import xarray as xr
 from matplotlib import rc_context
@@ -52,7 +54,7 @@ def mean_comparison(study: StudyNumbers) -> xr.Dataset:
 
 def mean_comparison_figure(comparison: xr.Dataset, title: str) -> Figure:
     """Draw the responses (left) and what separates the models (right), in degrees."""
-    mean = np.rad2deg(comparison["mean"])
+    mean = comparison["mean"] * (180 / np.pi)
     time = comparison["time"]
     rigid, nonlinear = (mean.sel(model=m) for m in ("linear_rigid", "nonlinear_rigid"))
     differences = {
@@ -74,7 +76,8 @@ def mean_comparison_figure(comparison: xr.Dataset, title: str) -> Figure:
             left.set_ylabel(f"{words(response)} (deg)")
             right.set_ylabel("difference (deg)")
         for axes, side in zip(panels[0], ("left", "right"), strict=True):
-            figure.legend(*axes.get_legend_handles_labels(), loc=f"outside lower {side}")
+            place: Any = f"outside lower {side}"  # matplotlib's stubs do not know places outside
+            figure.legend(*axes.get_legend_handles_labels(), loc=place)
         for axes in panels[-1]:
             axes.set_xlabel("flight time (s)")
         figure.suptitle(title)

@@ -5,21 +5,21 @@ from __future__ import annotations
 import re
 import warnings
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from ..codegen.node_functions import node_functions
 from ..model.errors import AscentwindError, AscentwindWarning, TimeRangeError, UnknownNameError
 from ..model.system import LinearSystem
-from ..model.tables import TableGroup
 from .flight_nodes import FlightNodes
 from .sensitivity_gradient import AdjointPair, Gradient
 from .sensitivity_peak import peak_time
+from .sensitivity_tables import tables_dataset, total_density
 from .stability import warn_if_unstable
+from .start_covariance import start_share
 from .statistics import COMBINED, provenance
 from .table_knots import knot_sensitivities
 
@@ -27,9 +27,6 @@ if TYPE_CHECKING:
     from .study import Study
 
 QUANTITIES: tuple[str, ...] = ("std", "variance", "mean", "mean_plus_3sigma")
-BAND = 1000.0  # m, of altitude
-WIND_MEAN = "wind.mean"
-WIND_OUTPUT = "wind_filter.H_"  # tables that a relative change of the wind's sigma multiplies
 STRUCTURAL = re.compile(r"(count|number|order|modes?|tanks?|masses|sources?|states?|loads?|outputs?)$")
 
 
@@ -140,7 +137,8 @@ def sensitivity(
     time, at_limit = end_time(study, request, time)
     warn_if_unstable(study.executable, time)
     pair = request.pair(study, time)
-    gradient = pair.gradient(*request.factors(pair))
+    factors = request.factors(pair)
+    gradient = pair.gradient(*factors)
     value = request.value(pair.variance, pair.mean)
     if elasticity and value == 0:
         raise ZeroQuantityError(
@@ -152,8 +150,9 @@ def sensitivity(
         groups = study.with_means.groups
         density = total_density(groups, pair.tables, gradient.tables)
         at_end = total_density(groups, pair.tables_at_end[None], gradient.tables_at_end[None])[0]
-        dataset = dataset.merge(_tables_dataset(study, pair, gradient, density, at_end, value, elasticity))
-        knots = knot_sensitivities(study, pair, gradient, density, at_end)
+        start = start_share(study.vehicle, pair, factors[0]) if factors[0] else None
+        dataset = dataset.merge(tables_dataset(study, pair, gradient, density, at_end, start, value, elasticity))
+        knots = knot_sensitivities(study, pair, gradient, density, at_end, start)
         if knots is not None:
             if elasticity:
                 knots["knot_elasticity"] = knots["knot_derivative"] * knots["knot_value"] / value
@@ -255,89 +254,3 @@ def _parameters_dataset(
         dataset["elasticity"].attrs["long_name"] = "percent of the quantity per percent of the parameter"
         dataset["elasticity_defined"] = ("parameter", (~zero).astype(np.int8))
     return dataset
-
-
-def _tables_dataset(
-    study: Study,
-    pair: AdjointPair,
-    gradient: Gradient,
-    density: NDArray,
-    at_end: NDArray,
-    value: float,
-    elasticity: bool,
-) -> xr.Dataset:
-    groups = study.with_means.groups
-    names = [n for g in groups for n in g.names]
-    units = [u for g in groups for u in g.units]
-    columns = [names.index(n) for g in groups if g.name != "mean" for n in g.names]
-    values, values_at_end = pair.tables, pair.tables_at_end
-    dataset = xr.Dataset(
-        {
-            "table_value": (("table", "t"), values[:, columns].T),
-            "table_derivative": (("table", "t"), density[:, columns].T),
-            "table_derivative_at_end": ("table", at_end[columns]),
-            "node_weight": ("t", gradient.weights, {"units": "s", "long_name": "quadrature weight of a time"}),
-        },
-        {
-            "table": [names[c] for c in columns],
-            "table_unit": ("table", [units[c] for c in columns]),
-            "t": ("t", gradient.times, {"units": "s", "long_name": "flight time"}),
-        },
-    )
-    dataset["table_derivative"].attrs = {
-        "long_name": "derivative with respect to the table's value at a time, response unit per table unit and second"
-    }
-    dataset["table_derivative_at_end"].attrs = {"long_name": "weight of the delta at t2, response unit per table unit"}
-    if elasticity:
-        relative = (gradient.weights @ (density * values) + at_end * values_at_end) / value
-        dataset["table_elasticity"] = ("table", relative[columns], {"units": "1"})
-        dataset["table_elasticity"].attrs["long_name"] = "percent per percent of the whole table, others held"
-    over = next((g.argument for g in groups if g.argument != "time"), None)
-    if over is not None:
-        at = values[:, names.index(over)]
-        dataset[over] = ("t", at, {"units": units[names.index(over)], "long_name": f"{over} at a time"})
-        if elasticity:
-            relative, last = gradient.weights[:, None] * density * values / value, at_end * values_at_end / value
-            for label, what, chosen in (
-                ("wind_sigma_elasticity", "the wind's sigma", [n for n in names if n.startswith(WIND_OUTPUT)]),
-                ("wind_mean_elasticity", "the mean wind", [n for n in names if n == WIND_MEAN]),
-            ):
-                if chosen:
-                    rows = [names.index(n) for n in chosen]
-                    end = (float(values_at_end[names.index(over)]), float(last[rows].sum()))
-                    dataset = dataset.merge(_bands(label, what, at, relative[:, rows].sum(axis=1), *end))
-    return dataset
-
-
-def _bands(
-    label: str, what: str, altitude: NDArray, share: NDArray, altitude_at_end: float, share_at_end: float
-) -> xr.Dataset:
-    """Return the elasticity to a quantity over altitude in each kilometre."""
-    edges = BAND * np.arange(np.floor(altitude.min() / BAND), np.floor(altitude.max() / BAND) + 2)
-    found = np.histogram(altitude, edges, weights=share)[0]
-    found[min(int((altitude_at_end - edges[0]) / BAND), found.size - 1)] += share_at_end
-    return xr.Dataset(
-        {label: ("band", found, {"units": "1", "long_name": f"percent per percent of {what} in that kilometre"})},
-        {"band": ("band", edges[:-1] + BAND / 2, {"units": "m", "long_name": "middle of a kilometre of altitude"})},
-    )
-
-
-def total_density(groups: tuple[TableGroup, ...], values: NDArray, density: NDArray) -> NDArray[np.float64]:
-    """Return densities in which the argument of a group (altitude) carries what it does through that group."""
-    names = [n for g in groups for n in g.names]
-    total = density.copy()
-    first = 0
-    for group in groups:
-        if group.argument != "time":
-            at = names.index(group.argument)
-            slope = _slopes(group, values[:, at])
-            total[:, at] += np.sum(density[:, first : first + len(group.names)] * slope, axis=1)
-        first += len(group.names)
-    return total
-
-
-def _slopes(group: TableGroup, argument: NDArray) -> NDArray[np.float64]:
-    c = group.coefficients
-    powers = np.stack([c[:, 1], 2 * c[:, 2], 3 * c[:, 3], np.zeros_like(c[:, 0])], axis=1)
-    inside = (argument >= group.knots[0]) & (argument <= group.knots[-1])
-    return replace(group, coefficients=powers).evaluate(argument) * inside[:, None]

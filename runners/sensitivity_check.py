@@ -24,6 +24,7 @@ from .mean_response import mean_response, with_mean_tables
 from .sensitivity import Request, sensitivity
 from .statistics import COMBINED
 from .table_knots import vehicle_rows
+from .wind_start import covariance_at
 
 if TYPE_CHECKING:
     from .study import Study
@@ -101,14 +102,24 @@ def check_sensitivity(
 
         def of_row(x: float, name: str = name, row: int = row) -> float:
             assert study.vehicle is not None
-            groups = vehicle_tables(_with_row(study.vehicle, name, row, x))
-            return _value(executable.with_numbers(groups=groups), request, time)
+            return _value(of_vehicle(executable, _with_row(study.vehicle, name, row, x)), request, time)
 
         labels.append(f"{name} at {found['knot_argument'].values[k]:g}")
         at.append(number)
         derivatives.append(float(found["knot_derivative"].values[k]))
         differences.append(central_difference(of_row, number, STEP * _reach(study.vehicle, name, row)))
     return _agreement(labels, np.array(at), np.array(derivatives), differences, value, found.attrs)
+
+
+def of_vehicle(executable: ExecutableSystem, vehicle: Vehicle) -> ExecutableSystem:
+    """Return the same code with the tables of a changed vehicle and its wind's covariance at the start."""
+    system = executable.system
+    altitude = float(vehicle.tables["altitude"].polynomial(vehicle.start))
+    covariance = covariance_at(vehicle.wind.shaping_filter, altitude)
+    wind, first = np.zeros((len(system.states),) * 2), system.state_names.index("wind_1")
+    wind[first : first + len(covariance), first : first + len(covariance)] = covariance
+    changed = replace(system, start_covariance={**system.start_covariance, "wind": wind})
+    return replace(executable, system=changed, groups=vehicle_tables(vehicle))
 
 
 def _value(executable: ExecutableSystem, request: Request, time: float) -> float:

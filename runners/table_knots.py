@@ -22,6 +22,7 @@ from scipy.sparse import csr_array
 from ..model.tables import ORDER, Table, TableGroup
 from ..model.vehicle import Vehicle
 from .sensitivity_gradient import AdjointPair, Gradient
+from .start_covariance import StartShare
 
 if TYPE_CHECKING:
     from .study import Study
@@ -36,12 +37,16 @@ def vehicle_rows(vehicle: Vehicle) -> dict[str, Table]:
 
 
 def knot_sensitivities(
-    study: Study, pair: AdjointPair, gradient: Gradient, density: NDArray, at_end: NDArray
+    study: Study,
+    pair: AdjointPair,
+    gradient: Gradient,
+    density: NDArray,
+    at_end: NDArray,
+    start: StartShare | None,
 ) -> xr.Dataset | None:
     """Return the derivative with respect to every row of every table of a vehicle; None without a vehicle.
 
-    A row of the altitude moves the rate of climb and, through the wind's tables, the wind that is met; the wind
-    filter's covariance at the start is held.
+    A row of the altitude moves the rate of climb and, through the wind's tables, the wind that is met.
 
     Parameters
     ----------
@@ -49,6 +54,8 @@ def knot_sensitivities(
         Derivative with respect to the table values at the nodes, per second.
     at_end : (n_v,) array
         Weight of its delta at t2.
+    start : StartShare or None
+        What goes through the covariance at the start.
     """
     if study.vehicle is None:
         return None
@@ -66,6 +73,8 @@ def knot_sensitivities(
         found = interval_moments(group, points, weighted[:, first : first + len(group.names)])
         moments |= dict(zip(group.names, np.moveaxis(found, 2, 0), strict=True))
         first += len(group.names)
+    if start is not None:
+        _add_start(groups, start, study.system.start, moments)
     rate = moments.get("altitude_rate")
     if rate is not None:  # the slope of the altitude: c1 + 2 c2 u + 3 c3 u^2
         moments["altitude"] = moments["altitude"].copy()
@@ -95,6 +104,15 @@ def knot_sensitivities(
     )
     dataset["knot_derivative"].attrs = {"long_name": "derivative with respect to one row, response unit per table unit"}
     return dataset
+
+
+def _add_start(groups: tuple[TableGroup, ...], start: StartShare, begin: float, moments: dict[str, NDArray]) -> None:
+    group_of = {name: group for group in groups for name in group.names}
+    for name, weights in start.by_table.items():
+        moments[name] = moments[name] + interval_moments(group_of[name], start.altitudes, weights[:, None])[..., 0]
+    by_altitude = np.array([[start.by_altitude]])
+    at_start = interval_moments(group_of["altitude"], np.array([begin]), by_altitude)[..., 0]
+    moments["altitude"] = moments["altitude"] + at_start
 
 
 def interval_moments(group: TableGroup, points: NDArray, weighted: NDArray) -> NDArray[np.float64]:

@@ -12,6 +12,7 @@ from ascentwind.runners.design import InfeasibleDesignError, design, trade, veri
 from ascentwind.runners.design_peaks import gradients, three_sigma
 from ascentwind.runners.design_problem import DesignProblemError, LoadReliefProblem
 from ascentwind.runners.frozen_roots import FrozenRoots
+from scipy.optimize import brentq
 
 LATE = (30.0, 40.0)  # s: a process of rate 1 is stationary by then
 GAINS = ("control.T1.gain", "control.T2.gain")
@@ -84,6 +85,15 @@ def test_a_limit_that_cannot_be_met_is_named_with_the_closest_value(lag):
         assert point.result.peak == pytest.approx(3 / np.sqrt(2 * k), rel=1e-6)
     assert points[2].result is None
     assert points[2].closest == pytest.approx(1.5, rel=1e-6)
+
+
+def test_the_closest_value_of_one_limit_keeps_the_others(lag):
+    """Of two limits one can hold alone; the other is told as close as it comes then, not as a compromise."""
+    limits = {"effort": 1.0, "both": 3.74}
+    k = brentq(lambda k: 3 * (1 + k**2) / np.sqrt(2 * k) - limits["both"], 0.5, 1 / np.sqrt(3))
+    with pytest.raises(InfeasibleDesignError, match="peak effort") as caught:
+        design(LoadReliefProblem(lag, {"k": (0.5, 3.0)}, LATE, response="load", peak_limits=limits))
+    assert caught.value.closest == pytest.approx(3 * np.sqrt(k / 2), rel=1e-6)
 
 
 @pytest.mark.parametrize("rate", [-0.1, -20.0])

@@ -63,6 +63,12 @@ def test_gravity_and_centrifugal_force_make_the_normal_gravity_of_wgs84():
         assert np.linalg.norm(np.cross(felt, up)) < 1e-5 * normal
 
 
+def test_ellipsoid_has_the_published_radii():
+    """WGS 84: semi-minor axis 6 356 752.3142 m (NIMA TR8350.2, table 3.3)."""
+    assert earth.site_position(np.pi / 2, 0.0)[2] == pytest.approx(6356752.3142, abs=1e-4)
+    assert earth.site_position(0.0, 0.0)[0] == 6378137.0
+
+
 @pytest.mark.parametrize("altitude", [0.0, 5e3, 8e4])
 @pytest.mark.parametrize("latitude", [0.0, 0.5, 1.2])
 def test_geodetic_is_the_inverse_of_the_site(latitude, altitude):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -139,7 +141,9 @@ def test_nonlinear_mean_is_a_choice(as504):
     ratio = (both[0] / both[1]).sel(source=["thrust", "center_of_pressure"]).values
     assert (ratio != 1).all()
     assert ratio == pytest.approx(1, abs=3e-3)
-    assert float(both[0].sel(source="wind")) == float(both[1].sel(source="wind"))
+    # the wind's part does not see the mean; only the step control of the common sweep does
+    wind = [float(b.sel(source="wind")) for b in both]
+    assert wind[0] == pytest.approx(wind[1], rel=1e-9)
     for ask in (
         lambda: study.batch([{}], [75.0]),
         lambda: study.sensitivity("bending_moment", 75.0),
@@ -154,3 +158,5 @@ def test_unstable_mean_flight_names_its_time(as504):
     with pytest.raises(DataError, match=r"the mean flight is unstable.*control law") as caught:
         planar_mean(study.vehicle, study.executable)
     assert 10 < caught.value.time < 60
+    angles = [abs(float(a)) for a in re.findall(r"(-?\d+) deg", str(caught.value))]
+    assert 45 <= max(angles) < 60  # told when it begins, not when it tumbles

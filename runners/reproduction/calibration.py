@@ -1,4 +1,4 @@
-"""Moving uncertain inputs inside their bounds towards the published figures, by least squares with exact derivatives."""
+"""Moving uncertain inputs inside their bounds towards the published figures: least squares, exact derivatives."""
 
 from __future__ import annotations
 
@@ -157,7 +157,8 @@ class Model:
         """Return each target with a function that gives its first-order change to a neighbouring study."""
         s = study.response_statistics(end_times(study))
         mean = s["mean"].sel(response=BENDING, source="wind")
-        at_mean = float(mean["time"][int(mean.argmax())])
+        times = s["time"].values
+        at_mean = float(times[np.argmax(mean.values)])
 
         def change(response: str, time: float, source: str, quantity: str) -> Callable[[Study], float]:
             if not derivatives:
@@ -168,8 +169,8 @@ class Model:
         def rise(response: str) -> tuple[float, Callable[[Study], float]]:
             total, wind = (s["mean_plus_3sigma"].sel(response=response, source=x) for x in (COMBINED, "wind"))
             a, b = float(total.max()), float(wind.max())
-            da = change(response, float(total["time"][int(total.argmax())]), COMBINED, "mean_plus_3sigma")
-            db = change(response, float(wind["time"][int(wind.argmax())]), "wind", "mean_plus_3sigma")
+            da = change(response, float(times[np.argmax(total.values)]), COMBINED, "mean_plus_3sigma")
+            db = change(response, float(times[np.argmax(wind.values)]), "wind", "mean_plus_3sigma")
             return a / b - 1, lambda moved: da(moved) / b - a * db(moved) / b**2
 
         def frequency(mode: int) -> tuple[float, Callable[[Study], float]]:
@@ -247,7 +248,8 @@ def calibrate(vehicle: str | Path = "as504", progress: Callable[[str], None] = l
 
         begin = np.clip((start - low) / span, 1e-6, 1 - 1e-6)
         before, first = misses(begin), slopes(begin)
-        result = least_squares(misses, begin, slopes, bounds=(0, 1), xtol=1e-4, ftol=1e-4, max_nfev=12)
+        limits = {"xtol": 1e-4, "ftol": 1e-4, "max_nfev": 12}
+        result = least_squares(misses, begin, slopes, bounds=(0, 1), **limits)  # pyright: ignore[reportArgumentType]
         values, study = at(result.x)
         after = model.figures(study)
     return Calibration(model.inputs, values, targets, (before + 1) * published, after, first, result.nfev)
