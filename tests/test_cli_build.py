@@ -34,7 +34,9 @@ def test_build_vehicle_writes_a_folder_that_runs_and_figures(ascentwind, tmp_pat
     code, printed, _ = ascentwind("build-vehicle", "as504", "--out", "mine", "--spacing", "10")
     assert code == 0
     assert "center engine cutoff" in printed and "134.34" in printed
-    assert {p.name for p in built_in_vehicles()["as504"].glob("*.toml")} <= {p.name for p in (tmp_path / "mine").iterdir()}
+    assert {p.name for p in built_in_vehicles()["as504"].glob("*.toml")} <= {
+        p.name for p in (tmp_path / "mine").iterdir()
+    }
     assert {p.stem for p in (tmp_path / "mine" / "figures").glob("*.png")} == set(FIGURES)
     code, printed, _ = ascentwind("inspect", "mine", "--time", "75")
     assert code == 0 and "bending.1.frequency" in printed
