@@ -86,7 +86,7 @@ def table_text(comments: Iterable[str], columns: Columns) -> str:
     """Return a table as CSV with comments above."""
     lines = [f"# {comment}" for comment in comments]
     lines.append(",".join(f"{name} [{unit}]" for name, unit in columns))
-    rows = np.stack(list(columns.values()), axis=1)
+    rows = np.stack(list(columns.values()), axis=1) + 0.0  # no minus before a zero
     rows[np.abs(rows) < ROUNDING * np.abs(rows).max(axis=0)] = 0.0  # where moments vanish: else no two builds agree
     lines += [",".join(f"{value:.{DIGITS}g}" for value in row) for row in rows]
     return "\n".join(lines) + "\n"
