@@ -13,7 +13,7 @@ from .sensitivity_figures import SHADES
 
 
 def trade_figure(trades: Mapping[str, Sequence[TradePoint]], response: str, title: str) -> Figure:
-    """Return lowest peak over limit, one line a variant; the start and what cannot be met are marked.
+    """Return lowest peak over limit, one line a variant, which ends where a limit cannot be met; the start is marked.
 
     Parameters
     ----------
@@ -37,17 +37,12 @@ def trade_figure(trades: Mapping[str, Sequence[TradePoint]], response: str, titl
             if met:
                 heights = [up * p.result.peak for p in met if p.result]
                 axes.plot([along * p.limit for p in met], heights, "o-", color=color, lw=2, ms=5, label=variant)
-            for point in points:
-                if point.result is None:
-                    axes.axvline(along * point.limit, color=color, lw=0.8, ls=":")
         axes.plot(
             along * before[f"peak {response}"], up * before[f"peak {first.problem.response}"],
             "*", color="black", ms=13, ls="none", label="start",
         )  # fmt: skip
         axes.set_xlabel(f"limit on the peak of |mean| + 3σ {words(response)}, {along_unit}")
         axes.set_ylabel(f"lowest peak of |mean| + 3σ {words(first.problem.response)}, {up_unit}")
-        if any(p.result is None for points in trades.values() for p in points):
-            axes.plot([], [], ":", color="black", lw=0.8, label="cannot be met (colour of its line)")
         axes.legend()
         axes.set_title(title, loc="left")
     return figure

@@ -34,9 +34,6 @@ ITERATIONS, RESTARTS = 60, 3
 class _FeasibleError(Exception):
     """Ends the search for a feasible point where one is found."""
 
-    def __init__(self, position: NDArray[np.float64]):
-        self.position = position.copy()
-
 
 @dataclass(frozen=True, eq=False)
 class Point:
@@ -181,23 +178,34 @@ class Search:
         ``elastic`` names the one limit (as in ``limit_names``, without the time) that may be violated; any without it.
         """
         gives = np.array([float(name.startswith(elastic)) for name in self.limit_names()])
+        best = u
 
-        def stop_when_feasible(z: NDArray[np.float64]) -> None:
-            if self.limits(np.clip(z[:-1], 0, 1)).min() >= 0:
-                raise _FeasibleError(z)
+        def missed(at: NDArray[np.float64]) -> tuple[float, float]:
+            """Violation of the limits that must hold, then of those that give way."""
+            short = np.maximum(-self.limits(at), 0.0)
+            hard = float((short * (1 - gives)).max())
+            return (hard if hard > ACTIVE else 0.0), float((short * gives).max())
 
         def slack(z: NDArray[np.float64]) -> NDArray[np.float64]:
-            return self.limits(np.clip(z[:-1], 0, 1)) + gives * z[-1]
+            nonlocal best
+            here = np.clip(z[:-1], 0, 1)
+            best = min(best, here, key=missed)
+            if self.violation(here) == 0:
+                raise _FeasibleError
+            return self.limits(here) + gives * z[-1]
 
         def slope(z: NDArray[np.float64]) -> NDArray[np.float64]:
             return np.hstack([self.limit_gradients(np.clip(z[:-1], 0, 1)), gives[:, None]])
 
-        start = max(0.0, -float((self.limits(u) * gives).min()))
-        try:
-            found = _slsqp(np.append(u, start), slack, slope, stop_when_feasible)
-        except _FeasibleError as end:
-            found = end.position
-        return np.clip(found[:-1], 0, 1)
+        for _ in range(RESTARTS):  # a trial flight that cannot be integrated may end the search far from the best
+            before = best
+            try:
+                _slsqp(np.append(before, missed(before)[1]), slack, slope, lambda _: None)
+            except _FeasibleError:
+                break
+            if missed(best) >= missed(before):
+                break
+        return best
 
     def descend(
         self, u: NDArray[np.float64], heard: Callable[[NDArray[np.float64]], None] = lambda _: None

@@ -118,13 +118,13 @@ def test_damping_and_growth_are_those_of_the_frozen_state_matrix_with_their_deri
         for family, frequency in (("bending_1", (6.0, 7.5)), ("bending_2", (11.0, 17.0))):
             mode = next(s for s in eigenvalues if frequency[0] < s.imag < frequency[1])
             assert found.damping[k, roots.families.index(family)] == pytest.approx(-mode.real / abs(mode), rel=1e-9)
-        slosh = [s for s in eigenvalues if 2.0 < s.imag < 5.0 and abs(s.real) < 0.1]
+        slosh = [s for s in eigenvalues if 2.0 < s.imag < 5.5 and abs(s.real) < 0.1]
         assert len(slosh) == 4
         least = min(-s.real / abs(s) for s in slosh)
         assert found.damping[k, roots.families.index("slosh")] == pytest.approx(least, rel=1e-9)
     for i, name in enumerate(names):
         value = as504.parameters[name].value
-        step = 1e-5 * value
+        step = 1e-4 * value  # roundoff of the eigenvalues of A, 1e-12, is then 1e-8 of a derivative
         up, down = (roots(as504.with_parameters({name: value + s}).executable.parameters) for s in (step, -step))
         for what in ("damping", "growth"):
             difference = (getattr(up, what) - getattr(down, what)) / (2 * step)

@@ -65,6 +65,7 @@ def page(found: Reproduction) -> str:
         difference=_difference,
         effect_cells=effect_cells,
         percent=_percent,
+        unit=lambda name: name.replace("1e6 ", "·10⁶ ").replace("m2", "m²").replace("deg", "°"),
         limit=lambda c: "" if c.limit is None else f"{c.limit:.3g}",
         failed=f"Outside its limit: {', '.join(failed)}." if failed else "All within their limits.",
         found=lambda i: _found(i, found.calibration),
@@ -123,7 +124,7 @@ def _effect_cells(effect: Effect, first: Effect) -> list[str]:
 
 def _found(item: Input, calibration: Calibration) -> str:
     value = calibration.values[item.name]
-    share = (value - item.low) / (item.high - item.low)
+    share = item.share(value)
     mark = " (lower bound)" if share < 0.005 else " (upper bound)" if share > 0.995 else ""
     return f"{value:.4g}{mark}"
 
