@@ -137,7 +137,8 @@ def kills(count: int, folder: Path) -> str:
         sys.exit("the resumed study differs")
     return (
         f"`ascentwind study` with 400 members, killed (SIGKILL) {hit} times at random moments: `study.nc` ends with "
-        f"the bytes of an uninterrupted run; none of the {len(before)} chunks stored at the last kill was written twice."
+        f"the bytes of an uninterrupted run, and none of the {len(before)} chunks stored at the last kill was written "
+        "twice."
     )
 
 

@@ -114,11 +114,11 @@ def along_figure(found: xr.Dataset, time: float, vehicle: Vehicle) -> Figure:
         for panel in axes[:2]:
             panel.axhline(0, color="black", lw=0.6)
             panel.set_ylabel(f"bending moment ({unit})")
-            panel.margins(x=0)
+            panel.margins(x=0, y=0.2)
             for n, load in enumerate(vehicle.file.loads):
                 label = None if n else "load station of the outputs"
                 panel.axvline(load.station_m, color="black", lw=0.8, ls=":", label=label)
-            panel.legend()
+            panel.legend(loc="upper center", ncols=4, fontsize=8.5)
         axes[-1].set_xlabel("vehicle station, forward to the right (m)")
         figure.suptitle(f"{vehicle.title}\nBending moment along the vehicle, with its answer to slosh")
     return figure

@@ -17,6 +17,7 @@ from .cli_build import build_vehicle
 from .cli_checks import equations, sensitivity, tolerance, verify
 from .cli_design import design
 from .cli_mean import mean
+from .cli_reproduce import reproduce
 from .cli_study import study
 from .cli_wind import app as wind_app
 from .terminal import VehicleArgument, console, errors, parse_changes, progress_bar
@@ -28,7 +29,7 @@ app = typer.Typer(
     help="Response statistics of ascending launch vehicles in a random wind, by the method of adjoint systems.",
 )
 app.add_typer(wind_app, name="wind")
-for command in (verify, tolerance, sensitivity, equations, study, mean, design):
+for command in (verify, tolerance, sensitivity, equations, study, mean, design, reproduce):
     app.command()(command)
 app.command("build-vehicle")(build_vehicle)
 

@@ -26,7 +26,8 @@ DISPLAY = {
     "Pa rad": (1e-3 * 180 / np.pi, "kPa deg"),
     "1": (1.0, "1"),
 }
-MOMENTS = ((1e6, "MN m"), (1e3, "kN m"), (1.0, "N m"))  # the first that leaves the largest value at 1 or more
+NEWTONS = ("N", "N m", "N m/rad")
+PREFIXES = ((1e6, "M"), (1e3, "k"), (1.0, ""))  # of newtons: the first that leaves the largest value at 1 or more
 TITLE_WIDTH = 76  # characters across a figure of 8 inches
 STYLE: dict[Any, Any] = {
     "figure.figsize": (8.0, 5.0),
@@ -44,10 +45,10 @@ COLORS = {"mean": "#444444", "wind": "#1f6fb4", COMBINED: "#c8442c"}
 
 def display(unit: str, values: ArrayLike) -> tuple[float, str]:
     """Return the factor from SI and the unit in which values of a response are shown."""
-    if unit == "N m":
+    if unit in NEWTONS:
         largest = float(np.nanmax(np.abs(values)))
-        size, shown = next((m for m in MOMENTS if largest >= m[0]), MOMENTS[0])
-        return 1 / size, shown
+        size, prefix = next((p for p in PREFIXES if largest >= p[0]), PREFIXES[0])
+        return 1 / size, prefix + unit
     return DISPLAY.get(unit, (1.0, unit))
 
 

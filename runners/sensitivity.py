@@ -227,7 +227,7 @@ def parameter_rows(system: LinearSystem, wanted: Iterable[str] | None) -> list[i
 def _parameters_dataset(
     study: Study, gradient: Gradient, rows: list[int], value: float, elasticity: bool
 ) -> xr.Dataset:
-    names = [study.system.parameter_names[i] for i in rows]
+    names = [study.system.parameters[i].name for i in rows]
     numbers, derivative = study.executable.parameters[rows], gradient.parameters[rows]
     dataset = xr.Dataset(
         {

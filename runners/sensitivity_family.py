@@ -68,7 +68,7 @@ def sensitivities(
             "time": ("time", ends, {"units": "s", "long_name": "end time t2"}),
             "response": names,
             "response_unit": ("response", [system.outputs[r.row].unit for r in requests]),
-            "parameter": [system.parameter_names[i] for i in rows],
+            "parameter": [system.parameters[i].name for i in rows],
             "parameter_unit": ("parameter", [system.parameters[i].unit for i in rows]),
         },
         provenance(study) | {"source": source, "quantity": quantity, "steps": flight.grid.steps.size},

@@ -19,6 +19,7 @@ from ascentwind.runners.engines import CovarianceOptions
 from ascentwind.runners.moments_along_vehicle import moments_along_vehicle
 from ascentwind.runners.sweep_engine import SweepOptions
 
+ALONG = "loads_along_vehicle.csv"
 AS504 = built_in_vehicles()["as504"]
 STATIONS = {"bending_moment": (25.0, 22.46), "bending_moment_b": (60.0, 57.46)}
 TIMES = [30.0, 41.3]
@@ -59,10 +60,10 @@ def folder(tmp_path_factory) -> Path:
         head = {"time [s]": time, "station [m]": time * 0 + station, "forward_of_gimbal [m]": time * 0 + forward}
         per_station.append(head | columns)
     long = {key: np.array([part[key] for part in per_station]).T.ravel() for key in per_station[0]}
-    write(made / "along.csv", long)
+    write(made / ALONG, long)
     write(
-        made / "local.csv",
-        {"time [s]": time[[0, -1]]} | {f"{n} [{u}]": np.full(2, 1e-3) for n, u, _ in local_columns(modes)},
+        made / "local_aerodynamics.csv",
+        {"time [s]": time[[0, 1, -2, -1]]} | {f"{n} [{u}]": np.full(4, 1e-3) for n, u, _ in local_columns(modes)},
     )
     text = (made / "vehicle.toml").read_text()
     first, last = text.index("[[loads]]"), text.index("# Relative deviations of tables")
@@ -72,8 +73,7 @@ def folder(tmp_path_factory) -> Path:
         for output, (station, forward) in STATIONS.items()
     )
     text = text[:first] + loads + text[last:]
-    more = f"[tables]\nlocal_aerodynamics = {entry('local.csv')}\nloads_along_vehicle = {entry('along.csv')}\n\n"
-    (made / "vehicle.toml").write_text(text.replace("[tables.rigid_body]", more + "[tables.rigid_body]", 1))
+    (made / "vehicle.toml").write_text(text)
     return made
 
 
@@ -110,9 +110,9 @@ def test_changed_parameters_come_along(folder):
 def test_refusals_say_what_to_do(folder, tmp_path):
     spoiled = tmp_path / "as504"
     shutil.copytree(folder, spoiled)
-    lines = (spoiled / "along.csv").read_text().splitlines()
-    (spoiled / "along.csv").write_text("\n".join(lines[:-1]) + "\n")
-    with pytest.raises(DataError, match=r"along\.csv: has \d+ rows for \d+ times and 2 stations"):
+    lines = (spoiled / ALONG).read_text().splitlines()
+    (spoiled / ALONG).write_text("\n".join(lines[:-1]) + "\n")
+    with pytest.raises(DataError, match=r"loads_along_vehicle\.csv: has \d+ rows for \d+ times and 2 stations"):
         moments_along_vehicle(Study.load(spoiled), TIMES)
     with pytest.raises(DataError, match=r"tables\.loads_along_vehicle.*build-vehicle"):
         moments_along_vehicle(Study.load(folder, changes={"tables.loads_along_vehicle": None}), TIMES)

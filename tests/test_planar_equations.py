@@ -141,7 +141,9 @@ def test_nonlinear_mean_is_a_choice(as504):
     ratio = (both[0] / both[1]).sel(source=["thrust", "center_of_pressure"]).values
     assert (ratio != 1).all()
     assert ratio == pytest.approx(1, abs=3e-3)
-    assert float(both[0].sel(source="wind")) == float(both[1].sel(source="wind"))
+    # the wind's part does not see the mean; only the step control of the common sweep does
+    wind = [float(b.sel(source="wind")) for b in both]
+    assert wind[0] == pytest.approx(wind[1], rel=1e-9)
     for ask in (
         lambda: study.batch([{}], [75.0]),
         lambda: study.sensitivity("bending_moment", 75.0),

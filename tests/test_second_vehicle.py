@@ -12,10 +12,14 @@ from ascentwind.model.construction.construction_file import load_construction
 from ascentwind.model.construction.earth import EQUATORIAL_RADIUS, GRAVITATIONAL_PARAMETER
 from ascentwind.model.construction.tank_shape import TankShape
 from ascentwind.model.shipped import built_in_vehicles
+from ascentwind.model.vehicle import load_vehicle
 from ascentwind.runners import Study
 from ascentwind.runners.build.build_vehicle import build_vehicle
 from ascentwind.runners.build.mean_flight import MeanFlight, fly
 from ascentwind.runners.covariance import covariance_equation
+from ascentwind.runners.figures import display
+from ascentwind.runners.new_vehicle import copy_vehicle
+from ascentwind.runners.times import parse_times, spread_over, time_of_greatest_dynamic_pressure
 
 FOLDER = built_in_vehicles()["falcon1"]
 TIMES = (40.0, 70.0)
@@ -129,12 +133,22 @@ def test_flight_against_published_figures(construction, flight):
     assert 60 < flight.time[greatest] < 80
 
 
-def test_whole_moment_is_shown_in_its_own_unit(falcon1):
-    from ascentwind.runners.figures import display
-
+def test_moment_is_shown_in_a_unit_of_its_size(falcon1):
     found = falcon1.response_statistics([70.0]).mean_plus_3sigma.sel(response=LOAD)
     assert display("N m", found) == (1e-3, "kN m")
     assert display("N m", 1e7) == (1e-6, "MN m")
+
+
+def test_default_times_come_from_the_vehicle(falcon1):
+    times = parse_times(falcon1.vehicle.file.default_times)
+    assert spread_over(times, 4) == [30.0, 67.0, 103.0, 140.0]
+    assert spread_over([5.0], 4) == [5.0]
+    assert time_of_greatest_dynamic_pressure(falcon1.vehicle) == 70.0
+
+
+def test_copy_names_both_files(tmp_path):
+    copy_vehicle("falcon1", tmp_path / "own")
+    assert load_construction(tmp_path / "own").name == load_vehicle(tmp_path / "own").name == "own"
 
 
 def _rows(file) -> np.ndarray:

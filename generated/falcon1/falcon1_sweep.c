@@ -1911,18 +1911,13 @@ static void step_block(const Matrices *restrict m, const double h, const double 
   }
   adjoint_rate(m->A, 11, y, k[11]);
   record(m, 11, 7, y, s, first);
-  {
-    const double c0 = h * 0.054293734116568765; const double c5 = h * 4.450312892752409; const double c6 = h *
-    1.8915178993145003; const double c7 = h * (-5.801203960010585); const double c8 = h * 0.3111643669578199; const
-    double c9 = h * (-0.1521609496625161); const double c10 = h * 0.20136540080403034; const double c11 = h *
-    0.04471061572777259;
-    for (i = 0; i < STATES * LANES; ++i) next[i] = x[i] + c0 * k[0][i] + c5 * k[5][i] + c6 * k[6][i] + c7 * k[7][i] + c8 * k[8][i] + c9 * k[9][i] + c10 * k[10][i] + c11 * k[11][i];
-  }
   for (i = 0; i < STATES; ++i)
     for (j = 0; j < LANES; ++j) {
-      const double w = weight[i * LANES + j];
-      const double e5 = w * (+ 0.01312004499419488 * k[0][i * LANES + j] - 1.2251564463762044 * k[5][i * LANES + j] - 0.4957589496572502 * k[6][i * LANES + j] + 1.6643771824549864 * k[7][i * LANES + j] - 0.35032884874997366 * k[8][i * LANES + j] + 0.3341791187130175 * k[9][i * LANES + j] + 0.08192320648511571 * k[10][i * LANES + j] - 0.022355307863886294 * k[11][i * LANES + j] );
-      const double e3 = w * (- 0.18980075407240762 * k[0][i * LANES + j] + 4.450312892752409 * k[5][i * LANES + j] + 1.8915178993145003 * k[6][i * LANES + j] - 5.801203960010585 * k[7][i * LANES + j] - 0.4226823213237919 * k[8][i * LANES + j] - 0.1521609496625161 * k[9][i * LANES + j] + 0.20136540080403034 * k[10][i * LANES + j] + 0.02265179219836082 * k[11][i * LANES + j] );
+      const int n = i * LANES + j;
+      const double w = weight[n], slope = + 0.054293734116568765 * k[0][n] + 4.450312892752409 * k[5][n] + 1.8915178993145003 * k[6][n] - 5.801203960010585 * k[7][n] + 0.3111643669578199 * k[8][n] - 0.1521609496625161 * k[9][n] + 0.20136540080403034 * k[10][n] + 0.04471061572777259 * k[11][n] ;
+      const double e5 = w * (+ 0.01312004499419488 * k[0][n] - 1.2251564463762044 * k[5][n] - 0.4957589496572502 * k[6][n] + 1.6643771824549864 * k[7][n] - 0.35032884874997366 * k[8][n] + 0.3341791187130175 * k[9][n] + 0.08192320648511571 * k[10][n] - 0.022355307863886294 * k[11][n] );
+      const double e3 = w * (slope - 0.2440944881889764 * k[0][n] - 0.7338466882816118 * k[8][n] - 0.022058823529411766 * k[11][n] );
+      next[n] = x[n] + h * slope;
       fine[j] += e5 * e5;
       coarse[j] += e3 * e3;
     }
@@ -2011,7 +2006,7 @@ static int sweep_segment(Flight *f, double begin, double end, double tolerance, 
     evaluate_stages(f, t, -h, &m);
     for (b = 0; b < BLOCKS; ++b) step_block(&m, h, x[b], w->column[b], &s, b);
     add_quadrature_errors(h, (const double (*)[COLUMNS])w->gain, &s);
-    for (j = 0; j < COLUMNS; ++j) if (!(s.error[j] <= error)) error = s.error[j];
+    for (j = 0; j < COLUMNS && !isnan(error); ++j) if (!(s.error[j] <= error)) error = s.error[j];
     count->evaluations += STAGES;
     if (!isfinite(error)) {
       const int entry = not_finite(&m, &i);
@@ -2051,24 +2046,25 @@ static int sweep_segment(Flight *f, double begin, double end, double tolerance, 
 
 /* ---- Forward over a segment ---- */
 
+/* result = factor' right, of which the first STATES rows are wanted */
+static void multiply(const double (*restrict factor)[COLUMNS], const double (*restrict right)[COLUMNS],
+                     double (*restrict result)[COLUMNS]) {
+  int i, j, c;
+  for (i = 0; i < STATES; ++i) {
+    double sum[COLUMNS] = { 0.0 };
+    for (j = 0; j < STATES; ++j)
+      for (c = 0; c < COLUMNS; ++c) sum[c] += factor[j][i] * right[j][c];
+    for (c = 0; c < COLUMNS; ++c) result[i][c] = sum[c];
+  }
+}
+
 /* inherited = Phi P Phi' */
 static void carry(const Segment *restrict g, const double *restrict P, double (*restrict inherited)[COLUMNS]) {
-  double product[STATES][COLUMNS];
-  int i, j, c;
-  memset(product, 0, sizeof product);
-  memset(inherited, 0, STATES * COLUMNS * sizeof(double));
-  for (i = 0; i < STATES; ++i)
-    for (j = 0; j < STATES; ++j) {
-      const double a = P[i * STATES + j];
-      if (a == 0.0) continue;
-      for (c = 0; c < COLUMNS; ++c) product[i][c] += a * g->transposed[j][c];
-    }
-  for (j = 0; j < STATES; ++j)
-    for (i = 0; i < STATES; ++i) {
-      const double a = g->transposed[j][i];
-      if (a == 0.0) continue;
-      for (c = 0; c < COLUMNS; ++c) inherited[i][c] += a * product[j][c];
-    }
+  double padded[STATES][COLUMNS] = { { 0.0 } }, product[STATES][COLUMNS];
+  int i;
+  for (i = 0; i < STATES; ++i) memcpy(padded[i], P + i * STATES, STATES * sizeof(double));
+  multiply((const double (*)[COLUMNS])padded, g->transposed, product); /* P is symmetric */
+  multiply(g->transposed, (const double (*)[COLUMNS])product, inherited);
 }
 
 /* w->column[j][r]: what a unit error of the adjoint of state r in place j means for a response, now or later, relative to
@@ -2275,7 +2271,8 @@ static void mean_rate(const Matrices *restrict m, const int i, const double *res
   (void)m; (void)i; (void)x;
 }
 
-/* Mean response at `count` times after `start`, from rest; arguments as for sweep, states (count, STATES). */
+/* Mean response at `start`, at rest, and at `count` times after it; arguments as for sweep, states (count + 1, STATES),
+ * outputs (count + 1, RESPONSES). */
 EXPORT int mean_history(int count, double start, const double *end, const double *low, const double *high, const double *p,
                         const double *tables, double tolerance, const double *size, double *states, double *outputs,
                         double *counters, double *failure) {
@@ -2292,6 +2289,11 @@ EXPORT int mean_history(int count, double start, const double *end, const double
   failure[0] = 0.0;
   failure[1] = -1.0;
   for (i = 0; i < STATES; ++i) largest[i] = 1e-3 * size[i];
+  f.low = low[0];
+  f.high = high[0];
+  memcpy(states, x, sizeof x);
+  evaluate_output(&f, start, C, direct);
+  respond(C, direct, x, outputs);
   for (n = 0; n < count; ++n) {
     f.low = low[n];
     f.high = high[n];
@@ -2365,9 +2367,9 @@ EXPORT int mean_history(int count, double start, const double *end, const double
         }
       }
     }
-    memcpy(states + n * STATES, x, sizeof x);
+    memcpy(states + (n + 1) * STATES, x, sizeof x);
     evaluate_output(&f, end[n], C, direct);
-    respond(C, direct, x, outputs + n * RESPONSES);
+    respond(C, direct, x, outputs + (n + 1) * RESPONSES);
   }
   return DONE;
 }

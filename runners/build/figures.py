@@ -9,7 +9,7 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..figures import STYLE, words
+from ..figures import STYLE, display, words
 from .vehicle_numbers import VehicleNumbers
 
 
@@ -23,10 +23,11 @@ def flight_figure(numbers: VehicleNumbers) -> Figure:
         _line(axes[0, 1], t, flight.relative_velocity, "relative velocity (m/s)")
         _line(axes[1, 0], t, flight.mach, "Mach number")
         _line(axes[1, 1], t, flight.dynamic_pressure / 1e3, "dynamic pressure (kPa)")
-        axes[2, 0].plot(t, flight.thrust / 1e6, label="thrust")
-        axes[2, 0].plot(t, flight.control_thrust / 1e6, "--", label="gimballed engines")
-        axes[2, 0].plot(t, flight.drag / 1e6, ":", label="drag")
-        axes[2, 0].set_ylabel("force (MN)")
+        factor, unit = display("N", flight.thrust)
+        axes[2, 0].plot(t, factor * flight.thrust, label="thrust")
+        axes[2, 0].plot(t, factor * flight.control_thrust, "--", label="gimballed engines")
+        axes[2, 0].plot(t, factor * flight.drag, ":", label="drag")
+        axes[2, 0].set_ylabel(f"force ({unit})")
         axes[2, 1].plot(t, np.rad2deg(flight.flight_path_angle), label="relative flight path above horizon")
         axes[2, 1].plot(t, 90 - np.rad2deg(flight.pitch), "--", label="axis above the horizon at launch")
         axes[2, 1].set_ylabel("angle (deg)")
@@ -132,12 +133,15 @@ def aerodynamics_figure(numbers: VehicleNumbers) -> Figure:
 def loads_figure(numbers: VehicleNumbers) -> Figure:
     """Return the coefficients of the bending moment along the vehicle at three times."""
     station = numbers.stations + numbers.construction.gimbal_station
+    rows = _rows(numbers)
+    of_angle, angle_unit = display("N m/rad", [numbers.loads[row].angle_of_attack for row in rows])
+    of_engine, engine_unit = display("N m/rad", [numbers.loads[row].engine_angle for row in rows])
     with rc_context(STYLE):
         figure, axes = _page(numbers, "coefficients of the bending moment along the vehicle", 2, 2, sharex=True)
-        for row, style in zip(_rows(numbers), ("-", "--", ":"), strict=True):
+        for row, style in zip(rows, ("-", "--", ":"), strict=True):
             c, label = numbers.loads[row], f"{numbers.flight.time[row]:.0f} s"
-            axes[0, 0].plot(station, c.angle_of_attack / 1e6, style, color="C0", label=label)
-            axes[0, 1].plot(station, c.engine_angle / 1e6, style, color="C0", label=label)
+            axes[0, 0].plot(station, of_angle * c.angle_of_attack, style, color="C0", label=label)
+            axes[0, 1].plot(station, of_engine * c.engine_angle, style, color="C0", label=label)
             for k in range(c.bending.shape[0]):
                 axes[1, 0].plot(
                     station, c.bending[k] / 1e3, style, color=f"C{k}", label=f"mode {k + 1}" if style == "-" else None
@@ -146,7 +150,7 @@ def loads_figure(numbers: VehicleNumbers) -> Figure:
                 axes[1, 1].plot(
                     station, c.slosh[k] / 1e3, style, color=f"C{k}", label=words(tank) if style == "-" else None
                 )
-        labels = ("M'_α (MN m/rad)", "M'_β (MN m/rad)", "M'_η (10³ N s²)", "M'_ξ (10³ N s²)")
+        labels = (f"M'_α ({angle_unit})", f"M'_β ({engine_unit})", "M'_η (10³ N s²)", "M'_ξ (10³ N s²)")
         for panel, label in zip(axes.flat, labels, strict=True):
             panel.set_ylabel(label)
             panel.set_xlabel("vehicle station (m)")

@@ -16,6 +16,7 @@ Array = NDArray[np.float64]
 Columns = dict[tuple[str, str], Array]
 
 DIGITS = 9
+ROUNDING = 1e-11  # of a column's largest value
 
 
 def vehicle_tables(numbers: VehicleNumbers, file: VehicleFile) -> dict[str, tuple[str, Columns]]:
@@ -86,6 +87,7 @@ def table_text(comments: Iterable[str], columns: Columns) -> str:
     lines = [f"# {comment}" for comment in comments]
     lines.append(",".join(f"{name} [{unit}]" for name, unit in columns))
     rows = np.stack(list(columns.values()), axis=1) + 0.0  # no minus before a zero
+    rows[np.abs(rows) < ROUNDING * np.abs(rows).max(axis=0)] = 0.0  # where moments vanish: else no two builds agree
     lines += [",".join(f"{value:.{DIGITS}g}" for value in row) for row in rows]
     return "\n".join(lines) + "\n"
 

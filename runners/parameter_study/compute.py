@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ...model.errors import AscentwindError
 from ..stability import first_unstable
 from ..study import Study
-from ..sweep_engine import BatchError, batch, sweep_of
+from ..sweep_engine import sweep, sweep_of, with_sweep_mean_tables
 from .quantities import Quantity, member_numbers
 
 CHUNK = 10  # members computed and stored together
@@ -89,22 +89,18 @@ def compute_chunk(study: Study, task: Task, chunk: Chunk) -> ChunkResult:
     """Return the statistics of the members of a chunk; one that fails leaves its reason and no more."""
     start = time.thread_time()
     result = empty_result(study, task, len(chunk.values))
-    reasons = list(result.reason)
+    reasons, engine = list(result.reason), sweep_of(study.system)
     rows = [study.system.output_index(name) for name in task.responses]
     for k, row in enumerate(chunk.values):
         try:
             member = member_numbers(study, task.quantities, row)
-            (found,) = batch(
-                sweep_of(study.system),
-                member,
-                [member.parameters],
-                task.times,
-                relative_tolerance=task.relative_tolerance,
-                threads=1,
+            member = with_sweep_mean_tables(engine, member, 1e-2 * task.relative_tolerance)
+            found = sweep(
+                engine, member, task.times, relative_tolerance=task.relative_tolerance, responses=task.responses
             )
             reasons[k] = first_unstable(member, task.times[-1]) or ""
         except AscentwindError as error:
-            reasons[k] = str(error.failed[0] if isinstance(error, BatchError) else error)
+            reasons[k] = str(error)
             continue
         result.mean[k], result.variance[k] = found.mean[:, rows], found.variance[:, rows]
         result.status[k] = UNSTABLE if reasons[k] else COMPUTED

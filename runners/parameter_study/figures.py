@@ -8,9 +8,9 @@ from matplotlib import rc_context
 from matplotlib.figure import Figure
 from scipy import stats
 
-from ..figures import COLORS, STYLE, display, words
+from ..figures import COLORS, STYLE, words
 from ..statistics import COMBINED
-from .measures import PEAK
+from .measures import PEAK, displayed
 from .run import ParameterStudy
 
 BINS = 40
@@ -18,7 +18,7 @@ BINS = 40
 
 def histogram_figure(result: ParameterStudy, measured: xr.Dataset, found: xr.Dataset, response: str) -> Figure:
     """Return the distribution of the peak mean + 3 sigma beside the first-order normal one."""
-    factor, unit = display(str(measured["unit"].sel(response=response).item()))
+    factor, unit = displayed(measured, response)
     at = found.sel(measure=PEAK, response=response)
     values = np.sort(factor * measured["sample"].sel(measure=PEAK, response=response).values)
     centre, sigma = (factor * at[name].item() for name in ("first_order_mean", "first_order_std"))
@@ -61,7 +61,7 @@ def histogram_figure(result: ParameterStudy, measured: xr.Dataset, found: xr.Dat
 def band_figure(result: ParameterStudy, found: xr.Dataset, response: str) -> Figure:
     """Return mean + 3 sigma over flight time: percentiles of the members, and the first-order band at the peak."""
     data = result.data.sel(response=response)
-    factor, unit = display(str(data["unit"].item()))
+    factor, unit = displayed(found, response)
     time = data["time"].values
     upper = factor * (data["mean"] + 3 * data["std"].sel(source=COMBINED)).values[result.computed]
     nominal = factor * (data["nominal_mean"] + 3 * data["nominal_std"].sel(source=COMBINED)).values
@@ -93,7 +93,7 @@ def band_figure(result: ParameterStudy, found: xr.Dataset, response: str) -> Fig
 def tornado_figure(result: ParameterStudy, found: xr.Dataset, response: str) -> Figure:
     """Return the changes of the peak mean + 3 sigma, the largest on top, with the first-order ones as marks."""
     part = found.sel(measure=PEAK, response=response)
-    factor, unit = display(str(part["unit"].item()))
+    factor, unit = displayed(found, response)
     change, predicted = (factor * part[name].values for name in ("change", "first_order_change"))
     size = np.nanmax(np.abs(np.concatenate([change, predicted], axis=1)), axis=1, initial=0.0)
     order = np.argsort(-size, kind="stable")
@@ -121,7 +121,7 @@ def tornado_figure(result: ParameterStudy, found: xr.Dataset, response: str) -> 
 
 def grid_figure(result: ParameterStudy, measured: xr.Dataset, response: str) -> Figure:
     """Return the peak mean + 3 sigma over one quantity as a line, over two as contours."""
-    factor, unit = display(str(measured["unit"].sel(response=response).item()))
+    factor, unit = displayed(measured, response)
     peak = np.full(result.data.sizes["member"], np.nan)
     peak[measured["member"].values] = factor * measured["sample"].sel(measure=PEAK, response=response).values
     values = result.data["value"].values

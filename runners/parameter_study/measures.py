@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
+from ..figures import display
 from ..statistics import COMBINED
 from .run import ParameterStudy
 
@@ -48,6 +49,11 @@ def measures(result: ParameterStudy) -> xr.Dataset:
             "member": ("computed_member", np.flatnonzero(kept)),
         },
     )
+
+
+def displayed(measured: xr.Dataset, response: str) -> tuple[float, str]:
+    """Return the factor from SI and the unit in which a response is shown, from its nominal peak."""
+    return display(str(measured["unit"].sel(response=response).item()), measured["nominal"].sel(response=response)[0])
 
 
 def _measures(mean: np.ndarray, std: np.ndarray, at: np.ndarray) -> np.ndarray:

@@ -12,16 +12,17 @@ import xarray as xr
 from rich.console import Console
 from rich.table import Table
 
-from ..figures import display, words, write_figure
+from ..figures import words, write_figure
 from ..output import write_bytes
 from .changes import changes
 from .compute import COMPUTED, FAILED, STATUS
 from .figures import band_figure, grid_figure, histogram_figure, tornado_figure
-from .measures import LABELS, PEAK, measures
+from .measures import LABELS, PEAK, displayed, measures
 from .run import ParameterStudy
 from .spread import spread
 
 SHOWN_REASONS = 3
+ENDS = ("", "_low", "_high")  # of a percentile: value and interval
 
 
 def report(result: ParameterStudy, folder: Path, console: Console) -> list[Path]:
@@ -135,25 +136,26 @@ def _print_reasons(result: ParameterStudy, console: Console) -> None:
         console.print("Failed members are left out of what follows; unstable ones are in it.", style="dim")
 
 
-def _shown(value: float, unit: str, digits: int = 4) -> str:
-    factor, _ = display(unit)
+def _shown(value: float, factor: float, digits: int = 4) -> str:
     return f"{factor * value:.{digits}g}" if np.isfinite(value) else "-"
 
 
 def _print_spread(found: xr.Dataset, console: Console) -> None:
     for response in _names(found, "response"):
         part = found.sel(response=response)
-        unit, time = part["unit"].item(), part["peak_time"].item()
-        title = f"{words(response).capitalize()} ({display(unit)[1]}) of {found.attrs['members']} members"
+        (factor, unit), time = displayed(found, response), part["peak_time"].item()
+        title = f"{words(response).capitalize()} ({unit}) of {found.attrs['members']} members"
         table = Table(title=f"{title}, below with 95 % intervals")
         table.add_column("of", no_wrap=True)
         for column in ("nominal", "mean", "σ", "first order σ", "ratio", "95 %", "99 %"):
             table.add_column(column, justify="right", no_wrap=True)
         for measure in _names(found, "measure"):
             at = part.sel(measure=measure)
-            numbers = {name: _shown(at[name].item(), unit, 3) for name in found.data_vars if at[name].ndim == 0}
+            numbers = {name: _shown(at[name].item(), factor, 3) for name in found.data_vars if at[name].ndim == 0}
             ranked = [
-                _interval(*(_shown(at[f"percentile{e}"].sel(percent=p).item(), unit, 3) for e in ("", "_low", "_high")))
+                _interval(
+                    *(_shown(at[f"percentile{e}"].sel(percent=p).item(), factor, 3) for e in ("", "_low", "_high"))
+                )
                 for p in (95.0, 99.0)
             ]
             table.add_row(
@@ -162,7 +164,7 @@ def _print_spread(found: xr.Dataset, console: Console) -> None:
                 numbers["sample_mean"],
                 _interval(numbers["sample_std"], numbers["sample_std_low"], numbers["sample_std_high"]),
                 numbers["first_order_std"],
-                _shown(at["ratio"].item(), "1", 3),
+                _shown(at["ratio"].item(), 1.0, 3),
                 *ranked,
             )
         console.print(table)
@@ -187,7 +189,7 @@ def _print_changes(found: xr.Dataset, console: Console) -> None:
         table.add_column(column, justify="right", no_wrap=True)
     for response in _names(found, "response"):
         part = found.sel(measure=PEAK, response=response)
-        factor, unit = display(part["unit"].item())
+        factor, unit = displayed(found, response)
         order = np.argsort(-np.abs(part["first_order_change"].values).max(axis=-1), kind="stable")
         for k, q in enumerate(order):
             at = part.isel(quantity=q)
@@ -211,11 +213,11 @@ def _print_grid(result: ParameterStudy, measured: xr.Dataset, console: Console) 
         values = peak.sel(response=response).values
         if not values.size:
             continue
-        unit = str(measured["unit"].sel(response=response).item())
-        cells = [_shown(measured["nominal"].sel(measure=PEAK, response=response).item(), unit)]
+        factor, unit = displayed(measured, response)
+        cells = [_shown(measured["nominal"].sel(measure=PEAK, response=response).item(), factor)]
         for k in (int(np.argmin(values)), int(np.argmax(values))):
             row = result.data["value"].values[measured["member"].values[k]]
             at = ", ".join(f"{q.name} = {v:.5g}" for q, v in zip(result.quantities, row, strict=True))
-            cells += [_shown(values[k], unit), at]
-        table.add_row(f"{words(response)} ({display(unit)[1]})", *cells)
+            cells += [_shown(values[k], factor), at]
+        table.add_row(f"{words(response)} ({unit})", *cells)
     console.print(table)

@@ -1,7 +1,8 @@
-"""Moving uncertain inputs inside their bounds towards the published figures, by least squares with exact derivatives."""
+"""Moving uncertain inputs inside their bounds towards the published figures: least squares, exact derivatives."""
 
 from __future__ import annotations
 
+import math
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -25,7 +26,7 @@ from .published import BY_NAME, Published
 from .rebuild import rebuilt, scaled_generalized_mass, scaled_normal_force, scaled_stiffness
 
 TARGETS = ("peak_mean", "sigma_75", "rise_bending", "rise_engine", "bending_1", "bending_2")
-STEP = 1e-3  # of an input's range, between the studies that tell how its tables change
+STEP = 1e-3  # share of an input's range, between the studies that tell how its tables change
 RULE = 0.03  # relative miss that counts as met
 
 
@@ -39,6 +40,8 @@ class Input:
     nominal, low, high : float
     source : str
         Where the bounds come from.
+    logarithmic : bool
+        Whether its range is divided evenly by ratio, not by difference.
     """
 
     name: str
@@ -48,6 +51,19 @@ class Input:
     low: float
     high: float
     source: str
+    logarithmic: bool = False
+
+    def value(self, share: float) -> float:
+        """Return the value at a share of the range, 0 to 1."""
+        if self.logarithmic:
+            return self.low * (self.high / self.low) ** share
+        return self.low + share * (self.high - self.low)
+
+    def share(self, value: float) -> float:
+        """Return the share of the range at which a value lies."""
+        if self.logarithmic:
+            return math.log(value / self.low) / math.log(self.high / self.low)
+        return (value - self.low) / (self.high - self.low)
 
 
 SECTION_9 = "bounds of the data compilation (docs/data.md)"
@@ -140,16 +156,16 @@ class Model:
         return np.array([value for value, _ in self._quantities(study, derivatives=False)])
 
     def jacobian(self, study: Study, values: dict[str, float]) -> NDArray[np.float64]:
-        """Return the derivatives of the targets by the inputs, (targets, inputs).
+        """Return the derivatives of the targets by the inputs as shares of their ranges, (targets, inputs).
 
         How tables change with an input is a difference of two builds; how a response changes with the tables is exact.
         """
         quantities = self._quantities(study, derivatives=True)
         columns = []
         for item in self.inputs:
-            step = STEP * (item.high - item.low)
-            step = -step if values[item.name] + step > item.high else step
-            moved = self.study(values | {item.name: values[item.name] + step})
+            share = item.share(values[item.name])
+            step = -STEP if share + STEP > 1 else STEP
+            moved = self.study(values | {item.name: item.value(share + step)})
             columns.append([derivative(moved) / step for _, derivative in quantities])
         return np.array(columns).T
 
@@ -157,7 +173,8 @@ class Model:
         """Return each target with a function that gives its first-order change to a neighbouring study."""
         s = study.response_statistics(end_times(study))
         mean = s["mean"].sel(response=BENDING, source="wind")
-        at_mean = float(mean["time"][int(mean.argmax())])
+        times = s["time"].values
+        at_mean = float(times[np.argmax(mean.values)])
 
         def change(response: str, time: float, source: str, quantity: str) -> Callable[[Study], float]:
             if not derivatives:
@@ -168,8 +185,8 @@ class Model:
         def rise(response: str) -> tuple[float, Callable[[Study], float]]:
             total, wind = (s["mean_plus_3sigma"].sel(response=response, source=x) for x in (COMBINED, "wind"))
             a, b = float(total.max()), float(wind.max())
-            da = change(response, float(total["time"][int(total.argmax())]), COMBINED, "mean_plus_3sigma")
-            db = change(response, float(wind["time"][int(wind.argmax())]), "wind", "mean_plus_3sigma")
+            da = change(response, float(times[np.argmax(total.values)]), COMBINED, "mean_plus_3sigma")
+            db = change(response, float(times[np.argmax(wind.values)]), "wind", "mean_plus_3sigma")
             return a / b - 1, lambda moved: da(moved) / b - a * db(moved) / b**2
 
         def frequency(mode: int) -> tuple[float, Callable[[Study], float]]:
@@ -224,13 +241,10 @@ def calibrate(vehicle: str | Path = "as504", progress: Callable[[str], None] = l
     published = np.array([t.value for t in targets])
     with tempfile.TemporaryDirectory() as work:
         model = Model(vehicle, Path(work))
-        low, high, start = (np.array([getattr(i, k) for i in model.inputs]) for k in ("low", "high", "nominal"))
-        names = [i.name for i in model.inputs]
-        span = high - low
         studies: dict[bytes, Study] = {}
 
         def at(x: NDArray) -> tuple[dict[str, float], Study]:
-            values = dict(zip(names, (low + span * x).tolist(), strict=True))
+            values = {i.name: i.value(float(share)) for i, share in zip(model.inputs, x, strict=True)}
             key = x.tobytes()
             if key not in studies:
                 studies[key] = model.study(values)
@@ -243,11 +257,12 @@ def calibrate(vehicle: str | Path = "as504", progress: Callable[[str], None] = l
 
         def slopes(x: NDArray) -> NDArray:
             values, study = at(x)
-            return model.jacobian(study, values) * span / published[:, None]
+            return model.jacobian(study, values) / published[:, None]
 
-        begin = np.clip((start - low) / span, 1e-6, 1 - 1e-6)
+        begin = np.clip([i.share(i.nominal) for i in model.inputs], 1e-6, 1 - 1e-6)
         before, first = misses(begin), slopes(begin)
-        result = least_squares(misses, begin, slopes, bounds=(0, 1), xtol=1e-4, ftol=1e-4, max_nfev=12)
+        limits = {"xtol": 1e-4, "ftol": 1e-4, "max_nfev": 25}
+        result = least_squares(misses, begin, slopes, bounds=(0, 1), **limits)  # pyright: ignore[reportArgumentType]
         values, study = at(result.x)
         after = model.figures(study)
     return Calibration(model.inputs, values, targets, (before + 1) * published, after, first, result.nfev)

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from ...model.errors import DirectNoiseError
+from ...model.shipped import find_vehicle
+from ...model.vehicle import VEHICLE_FILE
+from ...model.vehicle_file import read_vehicle_file
 from ..statistics import COMBINED
 from ..study import Study
 from .predictions import ATTACK, ENGINE, TIME, Responses, end_times, responses
+from .rebuild import rebuilt, third_mode
 
 
 @dataclass(frozen=True)
@@ -38,7 +43,15 @@ def _correlation(seconds: float) -> dict[str, float]:
 
 OPTIONS = (
     Option("local_angle_of_attack", "local angle of attack in all air forces", {"options.local_angle_of_attack": True}),
+    Option("third_bending_mode", "a third bending mode", construction={"bending_modes": 3}),
     Option("full_coupling", "slosh reacts on the rigid body too", {"options.full_coupling": True}),
+    Option(
+        "slosh_reaction", "the bending moment holds the vehicle's answer to slosh", {"options.slosh_reaction": True}
+    ),
+    Option("slosh_cylinder", "slosh of flat-bottomed cylinders", construction={"slosh_method": "cylinder"}),
+    Option(
+        "slosh_potential", "slosh by potential flow in the tank's shape", construction={"slosh_method": "potential"}
+    ),
     Option("correlation_time_0.3s", "vehicle noises with a correlation time of 0.3 s, not 1 s", _correlation(0.3)),
     Option("correlation_time_3s", "the same with 3 s", _correlation(3.0)),
     Option(
@@ -66,9 +79,15 @@ class Effect:
     sigma_engine: float
 
 
-def effect(vehicle: str | Path, option: Option | None = None) -> Effect:
-    """Compute the responses of a vehicle with an option, or as it is."""
-    study = Study.load(vehicle, changes=option.changes if option else None)
+def effect(folder: Path, option: Option | None, work: Path) -> Effect:
+    """Compute the responses of a vehicle with an option, or as it is; tables are built anew in ``work``."""
+    changes = dict(option.changes) if option else {}
+    if option and option.construction:
+        file = read_vehicle_file(folder / VEHICLE_FILE)
+        if option.construction.get("bending_modes", 0) > len(file.bending):
+            changes |= third_mode(file)
+        folder = rebuilt(folder, work / option.name, construction=option.construction, changes=changes)
+    study = Study.load(folder, changes=changes)
     try:
         statistics = study.response_statistics(end_times(study))
         found = responses(statistics)
@@ -79,21 +98,12 @@ def effect(vehicle: str | Path, option: Option | None = None) -> Effect:
     return Effect(option, found, float(std.sel(response=ATTACK)), float(std.sel(response=ENGINE)))
 
 
-def effects(
-    vehicle: str | Path,
-    folder_of: Callable[[Option], str | Path],
-    progress: Callable[[], None] = lambda: None,
-) -> list[Effect]:
-    """Return the vehicle as it is, then with each option by itself.
-
-    Parameters
-    ----------
-    vehicle : str or path
-    folder_of : callable
-        Gives the vehicle folder an option works on: the same, or one built anew.
-    """
-    found = [effect(vehicle)]
-    for option in OPTIONS:
-        progress()
-        found.append(effect(folder_of(option), option))
+def effects(vehicle: str | Path, progress: Callable[[str], None] = lambda name: None) -> list[Effect]:
+    """Return the vehicle as it is, then with each option by itself."""
+    folder = find_vehicle(vehicle)
+    found = []
+    with tempfile.TemporaryDirectory() as work:
+        for option in (None, *OPTIONS):
+            found.append(effect(folder, option, Path(work)))
+            progress(option.name if option else "as it is")
     return found

@@ -122,7 +122,7 @@ def predict(study: Study, local: Responses, wind_sensitivity: float) -> list[Pre
         "bending_1": modes["bending.1.frequency"],
         "bending_2": modes["bending.2.frequency"],
         "wind_error": wind.rms_error,
-        "wind_share": 1 - wind.share_inside,
+        "wind_share": wind.share_inside,
         "wind_sensitivity": wind_sensitivity,
     }
     return [Prediction(p, ours[p.name]) for p in PUBLISHED]
