@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.console import Console
 from rich.table import Table
 
 from .terminal import VehicleArgument, console, progress_bar
@@ -133,7 +134,7 @@ def _print_verification(found) -> None:
                     f"{std:.4g}", f"{low:.4g} to {high:.4g}", "yes" if found.inside[k, r, s] else "no",
                     end_section=s + 1 == reference["source"].size,
                 )  # fmt: skip
-    console.print(table, width=max(console.width, WIDE), crop=False)
+    Console(file=console.file, width=max(console.width, WIDE)).print(table)
 
 
 def tolerance(

@@ -17,6 +17,7 @@ from ascentwind.runners.build.modes import followed_modes
 from scipy.linalg import expm
 from scipy.optimize import brentq
 from small_construction import small_construction
+from threadpoolctl import threadpool_info, threadpool_limits
 
 ENGINE = replace(small_construction().engines[0], draws={}, residual={})
 LENGTH, BENDING, MASS = 30.0, 2e8, 6000.0
@@ -212,3 +213,17 @@ def test_modes_that_change_beyond_recognition_are_named():
         ModeError, match=r"bending mode 4 cannot be followed past t = 9\.2\d+ s.*modal assurance of 0\.0"
     ):
         followed_modes(vehicle, [0.0, 10.0], {"oxidizer": [20000.0, 0.0]}, 4)
+
+
+def test_modes_are_followed_on_one_thread_of_the_blas(monkeypatch):
+    """The matrices are so small that more threads, which wait for each other, take ten times as long."""
+    used, exact = [], FreeBeam.eigenmodes
+
+    def watched(self, masses, count):
+        used.extend(library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas")
+        return exact(self, masses, count)
+
+    monkeypatch.setattr(FreeBeam, "eigenmodes", watched)
+    with threadpool_limits(2, user_api="blas"):
+        followed_modes(small_construction(), [0.0, 1.0], {"oxidizer": [20000.0, 19900.0]}, 2)
+    assert used and set(used) == {1}

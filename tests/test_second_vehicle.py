@@ -74,9 +74,11 @@ def test_scale_of_the_moment_is_the_vehicles_own(falcon1, as504):
         assert [o.scale for o in moments] == [scale] * len(moments)
 
 
-def test_closed_loop_is_stable_at_frozen_times(falcon1):
+@pytest.mark.parametrize("full_coupling", [False, True])
+def test_closed_loop_is_stable_at_frozen_times(cache, full_coupling):
+    study = Study.load("falcon1", changes={"options.full_coupling": full_coupling}, compile=False)
     for time in FROZEN_TIMES:
-        A, keep = _vehicle_matrix(falcon1, float(time))
+        A, keep = _vehicle_matrix(study, float(time))
         assert np.linalg.eigvals(A[keep]).real.max() < 0, f"unstable at {time:g} s"
 
 

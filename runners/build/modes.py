@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import linear_sum_assignment
+from threadpoolctl import threadpool_limits
 
 from ...model.construction import Construction
 from ...model.errors import ModeError
@@ -105,11 +106,12 @@ def followed_modes(
         frequency, candidates, second = follow(halfway, middle, now, halvings - 1)
         return frequency, candidates, np.minimum(first, second)
 
-    step: _Step = (*beam.eigenmodes(masses_at(float(times[0])), count), np.ones(count))
-    steps = [step]
-    for before, now in pairwise(times):
-        step = follow(step[1], float(before), float(now), _HALVINGS)
-        steps.append(step)
+    with threadpool_limits(1, user_api="blas"):  # the matrices are small: on two threads they take ten times as long
+        step: _Step = (*beam.eigenmodes(masses_at(float(times[0])), count), np.ones(count))
+        steps = [step]
+        for before, now in pairwise(times):
+            step = follow(step[1], float(before), float(now), _HALVINGS)
+            steps.append(step)
     modes = [beam.scaled(frequency, shapes, float(t)) for t, (frequency, shapes, _) in zip(times, steps, strict=True)]
     return ModeHistory(
         time=times,
