@@ -203,7 +203,8 @@ class Search:
                 _slsqp(np.append(before, missed(before)[1]), slack, slope, lambda _: None)
             except _FeasibleError:
                 break
-            if missed(best) >= missed(before):
+            (hard, gave), (hard_before, gave_before) = missed(best), missed(before)
+            if hard >= hard_before and gave > 0.99 * gave_before:
                 break
         return best
 

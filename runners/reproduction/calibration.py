@@ -83,7 +83,14 @@ def inputs(correlation: tuple[float, float]) -> tuple[Input, ...]:
         ),
         Input("slosh_damping", "damping of slosh", "1", 0.01, 0.01, 0.05, "ring baffles; as above"),
         Input(
-            "correlation_time", "correlation time of thrust and X_CP noise", "s", 1.0, 0.1, 10.0, "assumed, no bound"
+            "correlation_time",
+            "correlation time of thrust and X_CP noise",
+            "s",
+            1.0,
+            0.1,
+            10.0,
+            "assumed, no bound",
+            True,
         ),
         Input(
             "wind_correlation",
