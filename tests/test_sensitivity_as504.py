@@ -45,7 +45,7 @@ def test_every_parameter_against_differences_of_the_same_discretisation(as504):
             lambda p, name=name: pair({name: p}).variance,
             parameter.value,
             0.02 * parameter.value,
-            levels=2,
+            levels=3,
         )
         assert gradient[i] == pytest.approx(expected.derivative, rel=1e-5), name
         checked += 1

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from ...model.errors import DataError
 from ..collocation_grid import tables_at
@@ -34,8 +35,20 @@ def directional_derivative(sensitivity: xr.Dataset, study: Study, neighbour: Stu
     change = neighbour.executable.parameters - study.executable.parameters
     parameters = float(sensitivity["derivative"].values @ change)
     times = sensitivity["t"].values
-    along = tables_at(other.tables, times)[:, keep] - sensitivity["table_value"].values.T
+    along = _difference(study, neighbour, times)[:, keep]
     tables = float(np.einsum("t,ht,th->", sensitivity["node_weight"], sensitivity["table_derivative"], along))
-    end = np.array([sensitivity.attrs["t2_s"]])
-    at_end = (tables_at(other.tables, end) - tables_at(system.tables, end))[0, keep]
+    at_end = _difference(study, neighbour, np.array([sensitivity.attrs["t2_s"]]))[0, keep]
     return parameters + tables + float(sensitivity["table_derivative_at_end"].values @ at_end)
+
+
+def _difference(study: Study, neighbour: Study, times: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return how all tables differ, (k, tables).
+
+    Tables over altitude are compared at the same altitude: what another altitude does is in the derivative by it.
+    """
+    names, here, found = [], tables_at(study.system.tables, times), []
+    for group, other in zip(study.system.tables, neighbour.system.tables, strict=True):
+        argument = times if group.argument == "time" else here[:, names.index(group.argument)]
+        found.append(other.evaluate(argument) - group.evaluate(argument))
+        names += group.names
+    return np.concatenate(found, axis=1)
