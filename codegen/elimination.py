@@ -11,41 +11,58 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+UNIT = -1  # as in the template
+
 
 @lru_cache(maxsize=16)
 def _plan(size: int, rows: tuple[int, ...], columns: tuple[int, ...]) -> NDArray[np.intc]:
     filled = np.eye(size, dtype=bool)
     filled[list(rows), list(columns)] = True
-    left, order = list(range(size)), []
+    rest, order = list(range(size)), []
     lowers: list[list[int]] = []
     uppers: list[list[int]] = []
-    while left:
-        block = filled[np.ix_(left, left)]
+    while rest:
+        block = filled[np.ix_(rest, rest)]
         cost = (block.sum(axis=0) - 1) * (block.sum(axis=1) - 1)
-        pivot = left.pop(int(np.argmin(cost)))
-        below = [i for i in left if filled[i, pivot]]
-        right = [j for j in left if filled[pivot, j]]
+        pivot = rest.pop(int(np.argmin(cost)))
+        below = [i for i in rest if filled[i, pivot]]
+        right = [j for j in rest if filled[pivot, j]]
         filled[np.ix_(below, right)] = True
         order.append(pivot)
         lowers.append(below)
         uppers.append(right)
-    number = np.full((size, size), -1)
-    number[filled] = np.arange(filled.sum())
-    lower = [(i, number[i, p]) for p, below in zip(order, lowers, strict=True) for i in below]
-    upper = [(j, number[p, j]) for p, right in zip(order, uppers, strict=True) for j in right]
+    position = np.argsort(order)
+    left, above = [[] for _ in order], [[] for _ in order]
+    for pivot, below, right in zip(order, lowers, uppers, strict=True):
+        for i in below:
+            left[position[i]].append(pivot)
+        for j in right:
+            above[position[j]].append(pivot)
+    unit = np.ones(size, bool)  # pivots in which nothing was written, I
+    unit[[i for i, j in zip(rows, columns, strict=True) if i == j]] = False
+    for below, right in zip(lowers, uppers, strict=True):
+        unit[list(set(below) & set(right))] = False
+    # numbered as the solution forward reads them
+    reads: list[tuple[int, int]] = []
+    for i, row in zip(order, left, strict=True):
+        reads += [(i, j) for j in row] + ([] if unit[i] else [(i, i)])
+    reads += [(i, j) for i, row in zip(reversed(order), reversed(uppers), strict=True) for j in row]
+    number = np.full((size, size), UNIT)
+    number[tuple(np.array(reads, int).reshape(-1, 2).T)] = np.arange(len(reads))
+
+    def lists(others: list[list[int]], in_row: bool) -> list:
+        blocks = [number[(k, o) if in_row else (o, k)] for k, of in zip(order, others, strict=True) for o in of]
+        return [np.cumsum([0, *map(len, others)]), [o for of in others for o in of], blocks]
+
     parts = [
-        [size, int(filled.sum()), len(rows), len(lower), len(upper)],
+        [size, len(reads), len(rows), sum(map(len, lowers)), sum(map(len, uppers))],
         order,
         [number[p, p] for p in order],
-        rows,
-        columns,
         number[list(rows), list(columns)],
-        np.cumsum([0, *map(len, lowers)]),
-        [i for i, _ in lower],
-        [b for _, b in lower],
-        np.cumsum([0, *map(len, uppers)]),
-        [j for j, _ in upper],
-        [b for _, b in upper],
+        *lists(left, True),
+        *lists(uppers, True),
+        *lists(above, False),
+        *lists(lowers, False),
         [number[i, j] for below, right in zip(lowers, uppers, strict=True) for i in below for j in right],
     ]
     return np.concatenate([np.asarray(part, np.intc) for part in parts])

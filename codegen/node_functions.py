@@ -182,7 +182,7 @@ class NodeFunctions:
         """
         values, first, found = self._evaluate(0, (t, v, z))[1], 0, {}
         for name, pattern in zip(MATRICES, self.expressions.patterns, strict=True):
-            found[name] = NodeMatrix(pattern, np.ascontiguousarray(values[:, first : first + pattern.nnz()]))
+            found[name] = NodeMatrix(pattern, values[:, first : first + pattern.nnz()])
             first += pattern.nnz()
         return found
 

@@ -176,8 +176,12 @@ class TableGroup:
         """Return all table values, shape (..., m)."""
         x = np.clip(np.asarray(argument, float), self.knots[0], self.knots[-1])
         i = np.clip(np.searchsorted(self.knots, x, side="right") - 1, 0, self.knots.size - 2)
-        u, c = (x - self.knots[i])[..., None], self.coefficients[i]
-        return c[..., 0, :] + u * (c[..., 1, :] + u * (c[..., 2, :] + u * c[..., 3, :]))
+        u, c = (x - self.knots[i])[..., None], self.coefficients
+        found = np.array(c[i, ORDER - 1])
+        for power in reversed(range(ORDER - 1)):
+            found *= u
+            found += c[i, power]
+        return found
 
     def lookup(self, argument: ca.MX, data: ca.MX, offset: int) -> ca.MX:
         """Return the values as a CasADi expression.

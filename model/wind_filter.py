@@ -108,13 +108,14 @@ class ShapingFilter:
         low, high = float(self.altitude[0]), float(self.altitude[-1])
         return TableGroup.from_polynomials("wind_filter", "altitude", polynomials, low, high)
 
-    def at(self, altitude: float) -> tuple[NDArray, NDArray, NDArray]:
-        """Return F (n, n), G (n, m) and H (n,) at an altitude in m."""
-        n = self.order
-        F, G, H = np.zeros((n, n)), np.zeros((n, self.noise_count)), np.zeros((1, n))
-        for (label, i, j), value in zip(self.entries, self._group.evaluate(altitude), strict=True):
-            {"F": F, "G": G, "H": H}[label][i, j] = value
-        return F, G, H[0]
+    def at(self, altitude: ArrayLike) -> tuple[NDArray, NDArray, NDArray]:
+        """Return F (..., n, n), G (..., n, m) and H (..., n) at altitudes (...) in m."""
+        n, values = self.order, self._group.evaluate(altitude)
+        shapes = {"F": (n, n), "G": (n, self.noise_count), "H": (1, n)}
+        found = {label: np.zeros((*values.shape[:-1], *shape)) for label, shape in shapes.items()}
+        for k, (label, i, j) in enumerate(self.entries):
+            found[label][..., i, j] = values[..., k]
+        return found["F"], found["G"], found["H"][..., 0, :]
 
 
 def entry_name(matrix: str, row: int, column: int) -> str:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ctypes
 import logging
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -29,11 +30,8 @@ TABLEAU = np.linalg.solve(
     np.vander(NODES, STAGES, increasing=True).T,
     (NODES[:, None] ** np.arange(1, STAGES + 1) / np.arange(1, STAGES + 1)).T,
 ).T
-SINGULAR = 1  # as in the template
-
-
-class NearlySingularError(IntegrationError):
-    """Elimination without exchanges met a pivot that it cannot divide by."""
+# d, with which the states at the stages give that at the end of a step, x + d (X - x)
+FROM_STAGES = np.linalg.solve(TABLEAU.T, WEIGHTS)
 
 
 class Collocation:
@@ -104,49 +102,59 @@ class Collocation:
 
 
 class CompiledCollocation:
-    """The same in C by sparse elimination without exchanges.
+    """The same in C by sparse elimination without exchanges; where a pivot nearly vanishes, LAPACK takes over.
 
-    Raises
-    ------
-    NearlySingularError
-        If a pivot is; LAPACK exchanges rows.
+    Parameters
+    ----------
+    grid, A :
+        As above.
+    library : Path
+    keep : bool
+        Keep the factors of all steps (27 KB a step of AS-504), which pays for more than a few solutions. Without it
+        every solution makes them again, step by step in the processor's cache.
     """
 
-    def __init__(self, grid: Grid, A: NodeMatrix, library: Path):
-        self.grid, plan = grid, elimination_plan(A.pattern)
-        self._code = ctypes.CDLL(str(library))
-        given = (plan, grid.steps, A.values, np.append(TABLEAU.ravel(), WEIGHTS))
-        self._arrays = (*map(np.ascontiguousarray, given), np.empty((grid.steps.size, plan[1], STAGES**2)))
-        code = self._code.collocation_factorise(ctypes.c_long(grid.steps.size), *map(_pointer, self._arrays))
-        if code == SINGULAR:
-            raise NearlySingularError("a pivot of the collocation equations is nearly singular")
-        if code:
-            raise IntegrationError("there is not enough memory for the collocation; free some")
+    def __init__(self, grid: Grid, A: NodeMatrix, library: Path, keep: bool = False):
+        self.grid, self._A, self._keep = grid, A, keep
+        code, plan = ctypes.CDLL(str(library)), elimination_plan(A.pattern)
+        self._forward, self._backward = code.collocation_forward, code.collocation_backward
+        tableau = np.concatenate([TABLEAU.T.ravel(), WEIGHTS, FROM_STAGES])
+        factors = np.empty((grid.steps.size if keep else 1, plan[1], STAGES**2))
+        self._arrays = (plan, grid.steps, np.ascontiguousarray(A.values), tableau, factors)
+        self._regular = not keep or code.collocation_factorise(
+            ctypes.c_long(grid.steps.size), *map(_pointer, self._arrays)
+        )
+
+    @cached_property
+    def _exchanging(self) -> Collocation:
+        log.info("a pivot of the collocation equations is nearly singular: solved by LAPACK, which exchanges rows")
+        return Collocation(self.grid, self._A)
 
     def forward(self, start: NDArray, forcing: NDArray) -> tuple[NDArray, NDArray]:
-        return self._solve(self._code.collocation_forward, start, forcing)
+        return self._solve(self._forward, start, forcing) or self._exchanging.forward(start, forcing)
 
     def backward(self, end: NDArray, forcing: NDArray) -> tuple[NDArray, NDArray]:
-        return self._solve(self._code.collocation_backward, end, forcing)
+        return self._solve(self._backward, end, forcing) or self._exchanging.backward(end, forcing)
 
-    def _solve(self, code: Any, first: NDArray, forcing: NDArray) -> tuple[NDArray, NDArray]:
+    def _solve(self, code: Any, first: NDArray, forcing: NDArray) -> tuple[NDArray, NDArray] | None:
+        if not self._regular:
+            return None
         state, stages = np.array(first, float), np.empty(forcing.shape)
         edges = np.empty((forcing.shape[0] + 1, state.size))
-        arrays = (*self._arrays, np.ascontiguousarray(forcing), state, stages, edges, np.empty(STAGES * state.size))
-        code.restype = None
-        code(ctypes.c_long(forcing.shape[0]), *map(_pointer, arrays))
-        return stages, edges
+        *given, factors = self._arrays
+        if not self._keep:
+            factors = np.empty_like(factors)  # several threads may solve at once
+        arrays = (np.ascontiguousarray(forcing), state, stages, edges, np.empty(STAGES * state.size))
+        pointers = (*map(_pointer, (*given, factors)), ctypes.c_int(self._keep), *map(_pointer, arrays))
+        return (stages, edges) if code(ctypes.c_long(forcing.shape[0]), *pointers) else None
 
 
 def _pointer(array: NDArray) -> ctypes.c_void_p:
     return array.ctypes.data_as(ctypes.c_void_p)
 
 
-def collocation(grid: Grid, A: NodeMatrix, library: Path | None) -> Collocation | CompiledCollocation:
+def collocation(
+    grid: Grid, A: NodeMatrix, library: Path | None, keep: bool = False
+) -> Collocation | CompiledCollocation:
     """Return the solver of a grid, compiled where there is a library."""
-    if library is not None:
-        try:
-            return CompiledCollocation(grid, A, library)
-        except NearlySingularError as error:
-            log.info("%s: solved by LAPACK, which exchanges rows", error)
-    return Collocation(grid, A)
+    return Collocation(grid, A) if library is None else CompiledCollocation(grid, A, library, keep)

@@ -47,7 +47,7 @@ def gradients(study: Study, rows: Iterable[Row], parameters: tuple[str, ...]) ->
     rows, system = list(rows), study.system
     columns = [system.parameter_names.index(name) for name in parameters]
     functions = node_functions(system, study.executable.shared_library is not None)
-    flight = FlightNodes.until(study.with_means, functions, sorted({time for _, _, time in rows}))
+    flight = FlightNodes.until(study.with_means, functions, sorted({time for _, _, time in rows}), keep=len(rows) > 1)
     pairs = {
         (response, time): AdjointPair(flight, system.output_index(response), time, system.sources)
         for response, _, time in rows

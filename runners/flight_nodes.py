@@ -46,11 +46,16 @@ class FlightNodes:
 
     @staticmethod
     def until(
-        executable: ExecutableSystem, functions: NodeFunctions, times: Sequence[float], step: float | None = None
+        executable: ExecutableSystem,
+        functions: NodeFunctions,
+        times: Sequence[float],
+        step: float | None = None,
+        keep: bool = False,
     ) -> FlightNodes:
         """Evaluate everything from the start to the last of the end times, s.
 
-        ``step`` is the longest step, s; from the roots of A without it.
+        ``step`` is the longest step, s; from the roots of A without it. ``keep`` is for many solutions
+        (:class:`CompiledCollocation`).
         """
         system, numbers = executable.system, functions.numbers(executable.parameters)
         if step is None:
@@ -61,7 +66,7 @@ class FlightNodes:
         nodes = grid.nodes.ravel()
         tables = tables_at(executable.groups, nodes)
         matrices = functions.matrices(nodes, tables, numbers)
-        solver = collocation(grid, matrices["A"], functions.shared_library)
+        solver = collocation(grid, matrices["A"], functions.shared_library, keep)
         return FlightNodes(executable, functions, grid, numbers, tables, matrices, solver)
 
     @cached_property

@@ -17,7 +17,7 @@ from ..model.system import LinearSystem
 from .flight_nodes import FlightNodes
 from .sensitivity_gradient import AdjointPair, Gradient
 from .sensitivity_peak import peak_time
-from .sensitivity_tables import tables_dataset, total_density
+from .sensitivity_tables import Parts, table_sensitivities, total_density
 from .stability import warn_if_unstable
 from .start_covariance import start_share
 from .statistics import COMBINED, provenance
@@ -145,19 +145,15 @@ def sensitivity(
             f"the {quantity} of '{response}' from '{source}' is zero at {time:g} s, so that a derivative in percent is "
             "not defined; pass elasticity=False for derivatives alone"
         )
-    dataset = _parameters_dataset(study, gradient, rows, value, elasticity)
+    relative_to = value if elasticity else None
+    variables, coordinates = _parameter_sensitivities(study, gradient, rows, relative_to)
     if any(g.name != "mean" for g in study.system.tables):
-        groups = study.with_means.groups
-        density = total_density(groups, pair.tables, gradient.tables)
-        at_end = total_density(groups, pair.tables_at_end[None], gradient.tables_at_end[None])[0]
+        total = total_density(study.with_means.groups, pair, gradient)
         start = start_share(study.vehicle, pair, factors[0]) if factors[0] else None
-        dataset = dataset.merge(tables_dataset(study, pair, gradient, density, at_end, start, value, elasticity))
-        knots = knot_sensitivities(study, pair, gradient, density, at_end, start)
-        if knots is not None:
-            if elasticity:
-                knots["knot_elasticity"] = knots["knot_derivative"] * knots["knot_value"] / value
-                knots["knot_elasticity"].attrs = {"units": "1", "long_name": "percent per percent of the knot's value"}
-            dataset = dataset.merge(knots)
+        for more in (table_sensitivities, knot_sensitivities):
+            parts = more(study, pair, total, start, relative_to)
+            variables, coordinates = variables | parts[0], coordinates | parts[1]
+    dataset = xr.Dataset(variables, coordinates)
     dataset.attrs = provenance(study) | {
         "response": response,
         "response_unit": study.system.outputs[request.row].unit,
@@ -224,33 +220,29 @@ def parameter_rows(system: LinearSystem, wanted: Iterable[str] | None) -> list[i
     return rows
 
 
-def _parameters_dataset(
-    study: Study, gradient: Gradient, rows: list[int], value: float, elasticity: bool
-) -> xr.Dataset:
-    names = [study.system.parameters[i].name for i in rows]
+def _parameter_sensitivities(study: Study, gradient: Gradient, rows: list[int], value: float | None) -> Parts:
+    parameters = [study.system.parameters[i] for i in rows]
     numbers, derivative = study.executable.parameters[rows], gradient.parameters[rows]
-    dataset = xr.Dataset(
-        {
-            "parameter_value": ("parameter", numbers, {"long_name": "present value"}),
-            "derivative": ("parameter", derivative, {"long_name": "derivative, response unit per parameter unit"}),
-        },
-        {
-            "parameter": names,
-            "parameter_unit": ("parameter", [study.system.parameters[i].unit for i in rows]),
-            "description": ("parameter", [study.system.parameters[i].description for i in rows]),
-        },
-    )
-    if elasticity:
+    label = {"long_name": "derivative, response unit per parameter unit"}
+    variables: dict[str, tuple] = {
+        "parameter_value": ("parameter", numbers, {"long_name": "present value"}),
+        "derivative": ("parameter", derivative, label),
+    }
+    if value is not None:
         zero = numbers == 0
         if zero.any():
-            listed = ", ".join(np.array(names)[zero])
+            listed = ", ".join(p.name for p, is_zero in zip(parameters, zero, strict=True) if is_zero)
             warnings.warn(
                 UndefinedElasticityWarning(
                     f"{listed}: zero, so that a change in percent is none; see the derivative instead"
                 ),
                 stacklevel=4,
             )
-        dataset["elasticity"] = ("parameter", derivative * numbers / value, {"units": "1"})
-        dataset["elasticity"].attrs["long_name"] = "percent of the quantity per percent of the parameter"
-        dataset["elasticity_defined"] = ("parameter", (~zero).astype(np.int8))
-    return dataset
+        label = {"units": "1", "long_name": "percent of the quantity per percent of the parameter"}
+        variables["elasticity"] = ("parameter", derivative * numbers / value, label)
+        variables["elasticity_defined"] = ("parameter", (~zero).astype(np.int8))
+    return variables, {
+        "parameter": [p.name for p in parameters],
+        "parameter_unit": ("parameter", [p.unit for p in parameters]),
+        "description": ("parameter", [p.description for p in parameters]),
+    }

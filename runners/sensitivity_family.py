@@ -39,7 +39,7 @@ def sensitivities(
     rows = parameter_rows(study.system, parameters)
     warn_if_unstable(study.executable, ends[-1])
     functions = node_functions(study.system, study.executable.shared_library is not None)
-    flight = FlightNodes.until(study.with_means, functions, ends)
+    flight = FlightNodes.until(study.with_means, functions, ends, keep=len(ends) * len(requests) > 1)
     _ = flight.mean  # once, before the threads
 
     def one(asked: tuple[float, Request]) -> tuple[float, NDArray[np.float64]]:

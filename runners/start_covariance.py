@@ -14,16 +14,18 @@ from typing import TYPE_CHECKING
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import solve_ivp
 
+from ..codegen.node_functions import NodeMatrix
 from ..model.system import LinearSystem
 from ..model.vehicle import Vehicle
 from ..model.wind_filter import ShapingFilter, entry_name
+from .collocation import Collocation
+from .collocation_grid import STAGES, Grid
 
 if TYPE_CHECKING:
     from .sensitivity_gradient import AdjointPair
 
-GAUSS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(4)
+RATE = 0.3  # longest step times the filter's rates
 
 
 @lru_cache(maxsize=32)
@@ -71,35 +73,32 @@ def start_share(vehicle: Vehicle | None, pair: AdjointPair, factor: float) -> St
         return None
     first = pair.executable.system.state_names.index("wind_1")
     a_top = pair.adjoint_at_start[first : first + shaping_filter.order]
-    inner = shaping_filter.altitude[(shaping_filter.altitude > bottom) & (shaping_filter.altitude < top)]
-    edges = np.concatenate([[bottom], inner, [top]])
-    nodes = np.concatenate([0.5 * (low + high) + 0.5 * (high - low) * GAUSS for low, high in pairwise(edges)])
-    weights = np.concatenate([0.5 * (high - low) * GAUSS_WEIGHTS for low, high in pairwise(edges)])
-    scale = float(np.abs(a_top).max()) or 1.0
-
-    def down(h: float, a: NDArray) -> NDArray:
-        return -shaping_filter.at(h)[0].T @ a
-
-    adjoint = _solve(down, (top, bottom), a_top, scale)
-
-    def up(h: float, y: NDArray) -> NDArray:
-        F, G, _ = shaping_filter.at(h)
-        return F @ y + G @ (G.T @ adjoint(h))
-
-    product = _solve(up, (bottom, top), shaping_filter.start_covariance @ adjoint(bottom), scale)
-    a, y = adjoint(nodes), product(nodes)
-    G_nodes = np.array([shaping_filter.at(h)[1] for h in nodes])
-    white = np.einsum("kim,ik->mk", G_nodes, a)
+    F_bottom = np.abs(shaping_filter.F[shaping_filter.altitude <= top]).sum(axis=2).max()
+    grid = _grid(shaping_filter, bottom, top, RATE / max(F_bottom, RATE / (top - bottom)))
+    nodes = grid.nodes.ravel()
+    F, G, _ = shaping_filter.at(nodes)
+    order = shaping_filter.order
+    solver = Collocation(grid, NodeMatrix(ca.Sparsity.dense(order, order), F.swapaxes(1, 2).reshape(nodes.size, -1)))
+    stages, edges = solver.backward(a_top, np.zeros((grid.steps.size, STAGES, order)))
+    a, a_bottom = stages.reshape(-1, order), edges[0]
+    white = np.einsum("kim,ki->km", G, a)
+    driven = np.einsum("kim,km->ki", G, white)
+    stages, edges = solver.forward(shaping_filter.start_covariance @ a_bottom, driven.reshape(-1, STAGES, order))
+    y, weights = stages.reshape(-1, order), grid.weights.ravel()
     by_table = {
-        entry_name(label, i, j): 2 * factor * weights * a[i] * (y if label == "F" else white)[j]
+        entry_name(label, i, j): 2 * factor * weights * a[:, i] * (y if label == "F" else white)[:, j]
         for label, i, j in shaping_filter.entries
         if label in "FG"
     }
-    return StartShare(nodes, by_table, factor * _rise(shaping_filter, top, a_top, product(top)))
+    return StartShare(nodes, by_table, factor * _rise(shaping_filter, top, a_top, edges[-1]))
 
 
-def _solve(rate, span: tuple[float, float], start: NDArray, scale: float):
-    return solve_ivp(rate, span, start, "DOP853", rtol=1e-11, atol=1e-13 * scale, dense_output=True).sol
+def _grid(shaping_filter: ShapingFilter, bottom: float, top: float, step: float) -> Grid:
+    """Return a grid over altitude with the filter's samples among its edges."""
+    h = shaping_filter.altitude
+    samples = np.concatenate([[bottom], h[(h > bottom) & (h < top)], [top]])
+    parts = (np.linspace(low, high, 1 + int(np.ceil((high - low) / step)))[1:] for low, high in pairwise(samples))
+    return Grid(np.concatenate([[bottom], *parts]))
 
 
 def _rise(shaping_filter: ShapingFilter, altitude: float, a: NDArray, y: NDArray) -> float:

@@ -14,14 +14,14 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
-from scipy.sparse import csr_array
+from scipy.sparse import csc_array
 
 from ..model.tables import ORDER, Table, TableGroup
 from ..model.vehicle import Vehicle
-from .sensitivity_gradient import AdjointPair, Gradient
+from .sensitivity_gradient import AdjointPair
+from .sensitivity_tables import Parts, TotalDensity
 from .start_covariance import StartShare
 
 if TYPE_CHECKING:
@@ -37,42 +37,38 @@ def vehicle_rows(vehicle: Vehicle) -> dict[str, Table]:
 
 
 def knot_sensitivities(
-    study: Study,
-    pair: AdjointPair,
-    gradient: Gradient,
-    density: NDArray,
-    at_end: NDArray,
-    start: StartShare | None,
-) -> xr.Dataset | None:
-    """Return the derivative with respect to every row of every table of a vehicle; None without a vehicle.
+    study: Study, pair: AdjointPair, total: TotalDensity, start: StartShare | None, value: float | None
+) -> Parts:
+    """Return the derivative with respect to every row of every table of a vehicle; nothing without a vehicle.
 
     A row of the altitude moves the rate of climb and, through the wind's tables, the wind that is met.
 
     Parameters
     ----------
-    density : (k, n_v) array
-        Derivative with respect to the table values at the nodes, per second.
-    at_end : (n_v,) array
-        Weight of its delta at t2.
+    total : TotalDensity
     start : StartShare or None
         What goes through the covariance at the start.
+    value : float or None
+        Of the quantity; None leaves elasticities out.
     """
     if study.vehicle is None:
-        return None
-    groups = study.with_means.groups
+        return {}, {}
+    groups, rows = study.with_means.groups, vehicle_rows(study.vehicle)
     names = [name for group in groups for name in group.names]
-    weighted = np.concatenate([gradient.weights[:, None] * density, at_end[None]])
     moments: dict[str, NDArray] = {}
     first = 0
     for group in groups:
-        if group.argument == "time":
-            points = np.append(gradient.times, pair.end)
-        else:
-            at = names.index(group.argument)
-            points = np.append(pair.tables[:, at], pair.tables_at_end[at])
-        found = interval_moments(group, points, weighted[:, first : first + len(group.names)])
-        moments |= dict(zip(group.names, np.moveaxis(found, 2, 0), strict=True))
-        first += len(group.names)
+        last = first + len(group.names)
+        if rows.keys() & set(group.names):
+            if group.argument == "time":
+                points = np.append(pair.times, pair.end)
+            else:
+                at = names.index(group.argument)
+                points = np.append(pair.tables[:, at], pair.tables_at_end[at])
+            inside, at_end = pair.weights[:, None] * total.along[:, first:last], total.at_end[None, first:last]
+            found = interval_moments(group, points, np.concatenate([inside, at_end]))
+            moments |= dict(zip(group.names, np.moveaxis(found, 2, 0), strict=True))
+        first = last
     if start is not None:
         _add_start(groups, start, study.system.start, moments)
     rate = moments.get("altitude_rate")
@@ -80,36 +76,36 @@ def knot_sensitivities(
         moments["altitude"] = moments["altitude"].copy()
         moments["altitude"][:, 1:] += np.arange(1, ORDER) * rate[:, :-1]
     knots_of = {name: group.knots for group in groups for name in group.names}
-    rows = vehicle_rows(study.vehicle)
     alike: dict[tuple, list[str]] = {}
     for name, table in rows.items():
         alike.setdefault(_shape(table, knots_of[name]), []).append(name)
-    derivatives: dict[str, NDArray] = {}
+    by_table: dict[str, NDArray] = {}
     for shape, of in alike.items():
         flat = np.stack([moments[name].ravel() for name in of])
-        derivatives |= dict(zip(of, flat @ _row_cubics(*shape), strict=True))
-    dataset = xr.Dataset(
-        {
-            "knot_value": ("knot", np.concatenate([table.values for table in rows.values()])),
-            "knot_derivative": ("knot", np.concatenate([derivatives[name] for name in rows])),
-        },
-        {
-            "knot_table": ("knot", [name for name, table in rows.items() for _ in table.values]),
-            "knot_argument": (
-                "knot",
-                np.concatenate([table.argument for table in rows.values()]),
-                {"long_name": "s, or m for the wind's tables"},
-            ),
-        },
-    )
-    dataset["knot_derivative"].attrs = {"long_name": "derivative with respect to one row, response unit per table unit"}
-    return dataset
+        by_table |= dict(zip(of, flat @ _row_cubics(*shape), strict=True))
+    values = np.concatenate([table.values for table in rows.values()])
+    derivatives = np.concatenate([by_table[name] for name in rows])
+    explained = {"long_name": "derivative with respect to one row, response unit per table unit"}
+    variables = {"knot_value": ("knot", values), "knot_derivative": ("knot", derivatives, explained)}
+    if value is not None:
+        relative = {"units": "1", "long_name": "percent per percent of the knot's value"}
+        variables["knot_elasticity"] = ("knot", derivatives * values / value, relative)
+    return variables, {
+        "knot_table": ("knot", np.repeat(list(rows), [table.values.size for table in rows.values()])),
+        "knot_argument": (
+            "knot",
+            np.concatenate([table.argument for table in rows.values()]),
+            {"long_name": "s, or m for the wind's tables"},
+        ),
+    }
 
 
 def _add_start(groups: tuple[TableGroup, ...], start: StartShare, begin: float, moments: dict[str, NDArray]) -> None:
     group_of = {name: group for group in groups for name in group.names}
-    for name, weights in start.by_table.items():
-        moments[name] = moments[name] + interval_moments(group_of[name], start.altitudes, weights[:, None])[..., 0]
+    of_filter = next(group_of[name] for name in start.by_table)
+    found = interval_moments(of_filter, start.altitudes, np.stack(list(start.by_table.values()), axis=1))
+    for name, part in zip(start.by_table, np.moveaxis(found, 2, 0), strict=True):
+        moments[name] = moments[name] + part
     by_altitude = np.array([[start.by_altitude]])
     at_start = interval_moments(group_of["altitude"], np.array([begin]), by_altitude)[..., 0]
     moments["altitude"] = moments["altitude"] + at_start
@@ -129,13 +125,13 @@ def interval_moments(group: TableGroup, points: NDArray, weighted: NDArray) -> N
     -------
     (intervals, 4, m) array
     """
-    x = np.clip(points, group.knots[0], group.knots[-1])
-    interval = np.clip(np.searchsorted(group.knots, x, side="right") - 1, 0, group.knots.size - 2)
-    u = x - group.knots[interval]
-    where = np.arange(x.size)
-    shape = (group.knots.size - 1, x.size)
-    powers = (csr_array((u**power, (interval, where)), shape) @ weighted for power in range(ORDER))
-    return np.stack(list(powers), axis=1)
+    x, count = np.clip(points, group.knots[0], group.knots[-1]), group.knots.size - 1
+    interval = np.clip(np.searchsorted(group.knots, x, side="right") - 1, 0, count - 1)
+    powers = (x - group.knots[interval])[:, None] ** np.arange(ORDER)
+    rows = ORDER * interval[:, None] + np.arange(ORDER)
+    columns = np.arange(0, powers.size + 1, ORDER)  # where each point's four entries begin
+    sums = csc_array((powers.ravel(), rows.ravel(), columns), (ORDER * count, x.size)) @ weighted
+    return sums.reshape(count, ORDER, -1)
 
 
 def _shape(table: Table, knots: NDArray) -> tuple[bytes, bytes, str, tuple[float, ...], bytes]:

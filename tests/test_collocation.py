@@ -11,8 +11,6 @@ from ascentwind.runners.collocation import (
     TABLEAU,
     Collocation,
     CompiledCollocation,
-    NearlySingularError,
-    collocation,
 )
 from ascentwind.runners.collocation_grid import STAGES, Grid
 
@@ -33,16 +31,22 @@ def at_nodes(dense: np.ndarray) -> NodeMatrix:
     return NodeMatrix(pattern, flat[:, pattern.row(), pattern.get_col()])
 
 
-def test_sparse_elimination_is_that_by_lapack(library):
-    """Random stable matrices, with forcing, forward and backward; and the duality of both."""
+@pytest.mark.parametrize("keep", [False, True])
+def test_sparse_elimination_is_that_by_lapack(library, keep):
+    """Random stable matrices, with forcing, forward and backward; and the duality of both.
+
+    The last two states do not act on themselves, so that their pivots are the unit matrix; one of them by nothing else.
+    """
     random = np.random.default_rng(504)
     edges = np.cumsum(np.append(0.0, random.uniform(0.01, 0.1, 21)))
     A = random.standard_normal((21, STAGES, 9, 9)) * (random.random((9, 9)) < 0.3) - 2 * np.eye(9)
+    A[:, :, 7:, 7:] = 0.0
+    A[:, :, 7, :7], A[:, :, 7, 2] = 0.0, 1.0
     x, a, f, g = *random.standard_normal((2, 9)), *random.standard_normal((2, 21, STAGES, 9))
     grid, matrices = Grid(edges), at_nodes(A)
     assert matrices.pattern.nnz() < 50
     np.testing.assert_array_equal(matrices.dense.reshape(A.shape), A)
-    compiled, reference = CompiledCollocation(grid, matrices, library), Collocation(grid, matrices)
+    compiled, reference = CompiledCollocation(grid, matrices, library, keep), Collocation(grid, matrices)
     for one, other in zip(compiled.forward(x, f), reference.forward(x, f), strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-11, atol=1e-13)
     for one, other in zip(compiled.backward(a, g[:13]), reference.backward(a, g[:13]), strict=True):
@@ -68,7 +72,8 @@ def test_order_eight(library):
     assert 200 < errors[0] / errors[1] < 320
 
 
-def test_a_pivot_that_vanishes_is_left_to_lapack(library):
+@pytest.mark.parametrize("keep", [False, True])
+def test_a_pivot_that_vanishes_is_left_to_lapack(library, keep, caplog):
     """With roots 1 / (h b) of two states by themselves, b of the tableau, I - h a A is singular in these two."""
     values = np.linalg.eigvals(TABLEAU)
     root = 1 / values[np.argmax(values.imag)]
@@ -76,9 +81,23 @@ def test_a_pivot_that_vanishes_is_left_to_lapack(library):
     A[:2, :2] = [[root.real, -root.imag], [root.imag, root.real]]
     A[0, 2] = A[2, 0] = A[2, 1] = 1.0
     grid, matrices = Grid(np.array([0.0, 1.0])), at_nodes(np.tile(A, (1, STAGES, 1, 1)))
-    with pytest.raises(NearlySingularError):
-        CompiledCollocation(grid, matrices, library)
-    assert isinstance(collocation(grid, matrices, library), Collocation)
+    x, f = np.array([1.0, 2.0, 3.0]), np.ones((1, STAGES, 3))
+    ours, reference = CompiledCollocation(grid, matrices, library, keep), Collocation(grid, matrices)
+    with caplog.at_level("INFO"):
+        for one, other in (
+            (ours.forward(x, f), reference.forward(x, f)),
+            (ours.backward(x, f), reference.backward(x, f)),
+        ):
+            np.testing.assert_array_equal(one[0], other[0])
+            np.testing.assert_array_equal(one[1], other[1])
+    assert "LAPACK" in caplog.text
+
+
+def test_no_state_acts_on_another(library):
+    """A = 0: nothing to eliminate, x grows by the integral of its forcing."""
+    grid, matrices = Grid(np.array([0.0, 0.5, 2.0])), at_nodes(np.zeros((2, STAGES, 2, 2)))
+    _, along = CompiledCollocation(grid, matrices, library).forward(np.array([1.0, 0.0]), np.ones((2, STAGES, 2)))
+    np.testing.assert_allclose(along, [[1.0, 0.0], [1.5, 0.5], [3.0, 2.0]], rtol=1e-14)
 
 
 def test_compiled_and_interpreted_agree(as504):

@@ -1,264 +1,292 @@
 /* ---- Collocation with four stages: steps of a sparse system, unknowns ordered state by state, stages within. ----
  *
- * N = I - h A (a x I) is the matrix of the stage derivatives: a block of 4 x 4 for every entry of A, and those that
- * elimination adds. A plan (codegen/elimination.py) gives the order of elimination and where each block is stored.
- * The factors of LANES steps are made at once, side by side. Blocks are pivots as they come; a pivot that is nearly
- * singular ends the run.
+ * M = I - h (a x I) A is the matrix of the states at the stages: a block of 4 x 4 for every entry of A, column by
+ * column, and those that elimination adds. A plan (codegen/elimination.py) gives the order of elimination and where
+ * each block is stored: in the order in which the solution forward reads them. Blocks are pivots as they come; a pivot
+ * that is nearly singular ends the run. Of M = (L + D) (I + U) stand L, the inverses of D, and U; pivots known to be
+ * the unit matrix, those of states whose rates do not hold themselves, are not stored.
  *
- * The tableau holds a by rows, then b.
+ * The tableau holds a by columns, then b, then d = b / a. With the states X at the stages, the state at the end of a
+ * step is x + d (X - x), so that no product with A is needed.
  */
 
 enum { STAGES = 4, BLOCK = STAGES * STAGES };
 #define NEARLY_SINGULAR 1e-12
 
+enum { UNIT = -1 };
+
 typedef struct {
   int states, blocks, entries;
-  const int *pivot, *diagonal;               /* states in order of elimination, and their own blocks */
-  const int *entry_row, *entry_column, *entry_block;
-  const int *lower_start, *lower_row, *lower_block;    /* below each pivot */
-  const int *upper_start, *upper_column, *upper_block; /* right of each pivot */
-  const int *target;                         /* of each product lower x upper, in their order */
+  const int *pivot, *diagonal;           /* states in order of elimination, and their own blocks, UNIT without one */
+  const int *entry_block;                /* of each entry of A */
+  const int *left_start, *left_state, *left_block;    /* of each pivot's row: blocks eliminated before */
+  const int *right_start, *right_state, *right_block; /* blocks that stay */
+  const int *above_start, *above_state, *above_block; /* of each pivot's column: blocks that stay */
+  const int *below_start, *below_state, *below_block; /* blocks to eliminate */
+  const int *target;                     /* of each product below x right, in their order */
 } Plan;
 
 static Plan read_plan(const int *numbers) {
   Plan p;
-  const int lowers = numbers[3], uppers = numbers[4];
+  const int lower = numbers[3], upper = numbers[4];
   p.states = numbers[0];
   p.blocks = numbers[1];
   p.entries = numbers[2];
   p.pivot = numbers + 5;
   p.diagonal = p.pivot + p.states;
-  p.entry_row = p.diagonal + p.states;
-  p.entry_column = p.entry_row + p.entries;
-  p.entry_block = p.entry_column + p.entries;
-  p.lower_start = p.entry_block + p.entries;
-  p.lower_row = p.lower_start + p.states + 1;
-  p.lower_block = p.lower_row + lowers;
-  p.upper_start = p.lower_block + lowers;
-  p.upper_column = p.upper_start + p.states + 1;
-  p.upper_block = p.upper_column + uppers;
-  p.target = p.upper_block + uppers;
+  p.entry_block = p.diagonal + p.states;
+  p.left_start = p.entry_block + p.entries;
+  p.left_state = p.left_start + p.states + 1;
+  p.left_block = p.left_state + lower;
+  p.right_start = p.left_block + lower;
+  p.right_state = p.right_start + p.states + 1;
+  p.right_block = p.right_state + upper;
+  p.above_start = p.right_block + upper;
+  p.above_state = p.above_start + p.states + 1;
+  p.above_block = p.above_state + upper;
+  p.below_start = p.above_block + upper;
+  p.below_state = p.below_start + p.states + 1;
+  p.below_block = p.below_state + lower;
+  p.target = p.below_block + lower;
   return p;
 }
 
-typedef double Block[BLOCK][LANES];
-
-/* Replace blocks by their inverses, from minors of two rows; return whether each is far from singular. */
-static int invert(double (*restrict d)[LANES]) {
-  int j, good = 1;
-  for (j = 0; j < LANES; ++j) {
-    const double a0 = d[0][j], a1 = d[1][j], a2 = d[2][j], a3 = d[3][j];
-    const double b0 = d[4][j], b1 = d[5][j], b2 = d[6][j], b3 = d[7][j];
-    const double c0 = d[8][j], c1 = d[9][j], c2 = d[10][j], c3 = d[11][j];
-    const double e0 = d[12][j], e1 = d[13][j], e2 = d[14][j], e3 = d[15][j];
-    /* minors of the upper two rows and of the lower two */
-    const double u0 = a0 * b1 - b0 * a1, u1 = a0 * b2 - b0 * a2, u2 = a0 * b3 - b0 * a3;
-    const double u3 = a1 * b2 - b1 * a2, u4 = a1 * b3 - b1 * a3, u5 = a2 * b3 - b2 * a3;
-    const double l0 = c0 * e1 - e0 * c1, l1 = c0 * e2 - e0 * c2, l2 = c0 * e3 - e0 * c3;
-    const double l3 = c1 * e2 - e1 * c2, l4 = c1 * e3 - e1 * c3, l5 = c2 * e3 - e2 * c3;
-    const double determinant = u0 * l5 - u1 * l4 + u2 * l3 + u3 * l2 - u4 * l1 + u5 * l0, r = 1.0 / determinant;
-    const double size = fabs(u0 * l5) + fabs(u1 * l4) + fabs(u2 * l3) + fabs(u3 * l2) + fabs(u4 * l1) + fabs(u5 * l0);
-    good &= fabs(determinant) > NEARLY_SINGULAR * size;
-    d[0][j] = (b1 * l5 - b2 * l4 + b3 * l3) * r;
-    d[1][j] = (-a1 * l5 + a2 * l4 - a3 * l3) * r;
-    d[2][j] = (e1 * u5 - e2 * u4 + e3 * u3) * r;
-    d[3][j] = (-c1 * u5 + c2 * u4 - c3 * u3) * r;
-    d[4][j] = (-b0 * l5 + b2 * l2 - b3 * l1) * r;
-    d[5][j] = (a0 * l5 - a2 * l2 + a3 * l1) * r;
-    d[6][j] = (-e0 * u5 + e2 * u2 - e3 * u1) * r;
-    d[7][j] = (c0 * u5 - c2 * u2 + c3 * u1) * r;
-    d[8][j] = (b0 * l4 - b1 * l2 + b3 * l0) * r;
-    d[9][j] = (-a0 * l4 + a1 * l2 - a3 * l0) * r;
-    d[10][j] = (e0 * u4 - e1 * u2 + e3 * u0) * r;
-    d[11][j] = (-c0 * u4 + c1 * u2 - c3 * u0) * r;
-    d[12][j] = (-b0 * l3 + b1 * l1 - b2 * l0) * r;
-    d[13][j] = (a0 * l3 - a1 * l1 + a2 * l0) * r;
-    d[14][j] = (-e0 * u3 + e1 * u1 - e2 * u0) * r;
-    d[15][j] = (c0 * u3 - c1 * u1 + c2 * u0) * r;
-  }
-  return good;
+/* Replace a block by its inverse, from minors of two rows; return whether it is far from singular. */
+static int invert(double *restrict d) {
+  const double a0 = d[0], a1 = d[1], a2 = d[2], a3 = d[3], b0 = d[4], b1 = d[5], b2 = d[6], b3 = d[7];
+  const double c0 = d[8], c1 = d[9], c2 = d[10], c3 = d[11], e0 = d[12], e1 = d[13], e2 = d[14], e3 = d[15];
+  /* minors of the first two and of the last two */
+  const double u0 = a0 * b1 - b0 * a1, u1 = a0 * b2 - b0 * a2, u2 = a0 * b3 - b0 * a3;
+  const double u3 = a1 * b2 - b1 * a2, u4 = a1 * b3 - b1 * a3, u5 = a2 * b3 - b2 * a3;
+  const double l0 = c0 * e1 - e0 * c1, l1 = c0 * e2 - e0 * c2, l2 = c0 * e3 - e0 * c3;
+  const double l3 = c1 * e2 - e1 * c2, l4 = c1 * e3 - e1 * c3, l5 = c2 * e3 - e2 * c3;
+  const double determinant = u0 * l5 - u1 * l4 + u2 * l3 + u3 * l2 - u4 * l1 + u5 * l0, r = 1.0 / determinant;
+  const double size = fabs(u0 * l5) + fabs(u1 * l4) + fabs(u2 * l3) + fabs(u3 * l2) + fabs(u4 * l1) + fabs(u5 * l0);
+  d[0] = (b1 * l5 - b2 * l4 + b3 * l3) * r;
+  d[1] = (-a1 * l5 + a2 * l4 - a3 * l3) * r;
+  d[2] = (e1 * u5 - e2 * u4 + e3 * u3) * r;
+  d[3] = (-c1 * u5 + c2 * u4 - c3 * u3) * r;
+  d[4] = (-b0 * l5 + b2 * l2 - b3 * l1) * r;
+  d[5] = (a0 * l5 - a2 * l2 + a3 * l1) * r;
+  d[6] = (-e0 * u5 + e2 * u2 - e3 * u1) * r;
+  d[7] = (c0 * u5 - c2 * u2 + c3 * u1) * r;
+  d[8] = (b0 * l4 - b1 * l2 + b3 * l0) * r;
+  d[9] = (-a0 * l4 + a1 * l2 - a3 * l0) * r;
+  d[10] = (e0 * u4 - e1 * u2 + e3 * u0) * r;
+  d[11] = (-c0 * u4 + c1 * u2 - c3 * u0) * r;
+  d[12] = (-b0 * l3 + b1 * l1 - b2 * l0) * r;
+  d[13] = (a0 * l3 - a1 * l1 + a2 * l0) * r;
+  d[14] = (-e0 * u3 + e1 * u1 - e2 * u0) * r;
+  d[15] = (c0 * u3 - c1 * u1 + c2 * u0) * r;
+  return fabs(determinant) > NEARLY_SINGULAR * size;
 }
 
-/* z = z + sign x y */
-static inline void add_product(const double sign, double (*restrict z)[LANES], const double (*restrict x)[LANES],
-                               const double (*restrict y)[LANES]) {
-  int i, j, k;
-  for (i = 0; i < STAGES; ++i)
-    for (k = 0; k < STAGES; ++k)
-      for (j = 0; j < LANES; ++j)
-        z[STAGES * i + k][j] += sign * (x[STAGES * i][j] * y[k][j] + x[STAGES * i + 1][j] * y[STAGES + k][j]
-                                        + x[STAGES * i + 2][j] * y[2 * STAGES + k][j]
-                                        + x[STAGES * i + 3][j] * y[3 * STAGES + k][j]);
+typedef double Four __attribute__((vector_size(STAGES * sizeof(double)))); /* of GCC and Clang */
+
+static inline Four load_four(const double *from) {
+  Four x;
+  memcpy(&x, from, sizeof x);
+  return x;
 }
 
-/* Factorise up to LANES steps from h, A on. Lanes beyond the last repeat it. */
-static int factorise(const Plan *p, long valid, const double *h, const double *A, const double *tableau, Block *N,
-                     double *factors) {
+static inline void store_four(double *to, Four x) { memcpy(to, &x, sizeof x); }
+
+typedef struct {
+  Four column[STAGES];
+} Square;
+
+static inline Square load_square(const double *from) {
+  const Square F = { { load_four(from), load_four(from + 4), load_four(from + 8), load_four(from + 12) } };
+  return F;
+}
+
+/* F x */
+static inline Four times(Square F, const double *x) {
+  return (F.column[0] * x[0] + F.column[1] * x[1]) + (F.column[2] * x[2] + F.column[3] * x[3]);
+}
+
+/* y - F x */
+static inline Four less(Four y, Square F, const double *x) {
+  int k;
+  for (k = 0; k < STAGES; ++k) y -= F.column[k] * x[k];
+  return y;
+}
+
+/* the sum of each column, as one vector: a store of single numbers would hold up the next load of all four */
+static inline Four column_sums(Square F) {
+  const Four a = F.column[0], b = F.column[1], c = F.column[2], d = F.column[3];
+  const Four first = { a[0], b[0], c[0], d[0] }, second = { a[1], b[1], c[1], d[1] };
+  const Four third = { a[2], b[2], c[2], d[2] }, fourth = { a[3], b[3], c[3], d[3] };
+  return (first + second) + (third + fourth);
+}
+
+static int factorise(const Plan *p, double h, const double *A, const double *restrict tableau, double *N) {
   const int *target = p->target;
-  long at[LANES];
-  Block copy;
-  int i, j, k, s, pivot, l, u;
-  memset(N, 0, p->blocks * sizeof(Block));
-  for (j = 0; j < LANES; ++j) at[j] = j < valid ? j : valid - 1;
-  for (s = 0; s < STAGES; ++s)
-    for (k = 0; k < p->entries; ++k) {
-      double (*restrict row)[LANES] = N[p->entry_block[k]] + STAGES * s;
-      double entry[LANES];
-      for (j = 0; j < LANES; ++j) entry[j] = h[at[j]] * A[(STAGES * at[j] + s) * p->entries + k];
-      for (i = 0; i < STAGES; ++i)
-        for (j = 0; j < LANES; ++j) row[i][j] = -tableau[STAGES * s + i] * entry[j];
-    }
-  for (i = 0; i < p->states; ++i)
+  Square scaled;
+  int i, k, s, pivot, l, u;
+  memset(N, 0, (size_t)p->blocks * BLOCK * sizeof(double));
+  for (s = 0; s < STAGES; ++s) scaled.column[s] = -h * load_four(tableau + STAGES * s);
+  for (k = 0; k < p->entries; ++k)
     for (s = 0; s < STAGES; ++s)
-      for (j = 0; j < LANES; ++j) N[p->diagonal[i]][(STAGES + 1) * s][j] += 1.0;
+      store_four(N + BLOCK * p->entry_block[k] + STAGES * s, scaled.column[s] * A[s * p->entries + k]);
+  for (i = 0; i < p->states; ++i)
+    for (s = 0; s < BLOCK && p->diagonal[i] != UNIT; s += STAGES + 1) N[BLOCK * p->diagonal[i] + s] += 1.0;
   for (pivot = 0; pivot < p->states; ++pivot) {
-    double (*own)[LANES] = N[p->diagonal[pivot]];
-    if (!invert(own)) return 1;
-    for (l = p->lower_start[pivot]; l < p->lower_start[pivot + 1]; ++l) {
-      double (*lower)[LANES] = N[p->lower_block[l]];
-      memcpy(copy, lower, sizeof copy);
-      memset(lower, 0, sizeof copy);
-      add_product(1.0, lower, (const double (*)[LANES])copy, (const double (*)[LANES])own);
-      for (u = p->upper_start[pivot]; u < p->upper_start[pivot + 1]; ++u)
-        add_product(-1.0, N[*target++], (const double (*)[LANES])lower, (const double (*)[LANES])N[p->upper_block[u]]);
+    if (p->diagonal[pivot] != UNIT) {
+      double *own = N + BLOCK * p->diagonal[pivot];
+      if (!invert(own)) return 0;
+      const Square inverse = load_square(own);
+      for (u = p->right_start[pivot]; u < p->right_start[pivot + 1]; ++u)
+        for (s = 0; s < BLOCK; s += STAGES) {
+          double *column = N + BLOCK * p->right_block[u] + s;
+          store_four(column, times(inverse, column));
+        }
+    }
+    for (l = p->below_start[pivot]; l < p->below_start[pivot + 1]; ++l) {
+      const Square below = load_square(N + BLOCK * p->below_block[l]);
+      for (u = p->right_start[pivot]; u < p->right_start[pivot + 1]; ++u) {
+        double *to = N + BLOCK * *target++;
+        const double *right = N + BLOCK * p->right_block[u];
+        for (s = 0; s < BLOCK; s += STAGES) store_four(to + s, less(load_four(to + s), below, right + s));
+      }
     }
   }
-  for (j = 0; j < valid; ++j)
-    for (i = 0; i < p->blocks; ++i)
-      for (k = 0; k < BLOCK; ++k) factors[((long)j * p->blocks + i) * BLOCK + k] = N[i][k][j];
-  return 0;
+  return 1;
 }
 
-/* y = y - F x, y = y - F' x, x = F x and x = F' x with one block */
-static inline void subtract(const double *restrict F, const double *restrict x, double *restrict y) {
-  int i;
-  for (i = 0; i < STAGES; ++i, F += STAGES) y[i] -= F[0] * x[0] + F[1] * x[1] + F[2] * x[2] + F[3] * x[3];
-}
-
-static inline void subtract_transposed(const double *restrict F, const double *restrict x, double *restrict y) {
-  int i;
-  for (i = 0; i < STAGES; ++i) y[i] -= F[i] * x[0] + F[4 + i] * x[1] + F[8 + i] * x[2] + F[12 + i] * x[3];
-}
-
-static inline void apply(const double *restrict F, double *restrict x) {
-  double y[STAGES] = { 0.0 };
-  subtract(F, x, y);
-  for (int i = 0; i < STAGES; ++i) x[i] = -y[i];
-}
-
-static inline void apply_transposed(const double *restrict F, double *restrict x) {
-  double y[STAGES] = { 0.0 };
-  subtract_transposed(F, x, y);
-  for (int i = 0; i < STAGES; ++i) x[i] = -y[i];
-}
-
-static void solve_step(const Plan *p, const double *restrict F, double *restrict x) {
-  int i, l;
-  for (i = 0; i < p->states; ++i)
-    for (l = p->lower_start[i]; l < p->lower_start[i + 1]; ++l)
-      subtract(F + BLOCK * p->lower_block[l], x + STAGES * p->pivot[i], x + STAGES * p->lower_row[l]);
-  for (i = p->states - 1; i >= 0; --i) {
-    for (l = p->upper_start[i]; l < p->upper_start[i + 1]; ++l)
-      subtract(F + BLOCK * p->upper_block[l], x + STAGES * p->upper_column[l], x + STAGES * p->pivot[i]);
-    apply(F + BLOCK * p->diagonal[i], x + STAGES * p->pivot[i]);
+/* Return x less the sum of F y over listed blocks. */
+static inline Four less_rows(int first, int last, const int *restrict block, const int *restrict state, const double *F,
+                             const double *all, const double *x) {
+  Four sum[STAGES] = { load_four(x) };
+  int k, l;
+  for (l = first; l < last; ++l) {
+    const double *f = F + BLOCK * block[l], *y = all + STAGES * state[l];
+    for (k = 0; k < STAGES; ++k) sum[k] -= load_four(f + STAGES * k) * y[k];
   }
+  return (sum[0] + sum[1]) + (sum[2] + sum[3]);
 }
 
-static void solve_transposed_step(const Plan *p, const double *restrict F, double *restrict x) {
-  int i, l;
+/* Return x less the sum of F' y over listed blocks. */
+static inline Four less_columns(int first, int last, const int *restrict block, const int *restrict state,
+                                const double *F, const double *all, const double *x) {
+  Square sum = { { { 0.0 } } };
+  int k, l;
+  for (l = first; l < last; ++l) {
+    const double *f = F + BLOCK * block[l];
+    const Four y = load_four(all + STAGES * state[l]);
+    for (k = 0; k < STAGES; ++k) sum.column[k] += load_four(f + STAGES * k) * y;
+  }
+  return load_four(x) - column_sums(sum);
+}
+
+static void solve_step(const Plan *p, const double *F, double *x) {
+  int i;
   for (i = 0; i < p->states; ++i) {
-    apply_transposed(F + BLOCK * p->diagonal[i], x + STAGES * p->pivot[i]);
-    for (l = p->upper_start[i]; l < p->upper_start[i + 1]; ++l)
-      subtract_transposed(F + BLOCK * p->upper_block[l], x + STAGES * p->pivot[i], x + STAGES * p->upper_column[l]);
+    double *own = x + STAGES * p->pivot[i];
+    store_four(own, less_rows(p->left_start[i], p->left_start[i + 1], p->left_block, p->left_state, F, x, own));
+    if (p->diagonal[i] != UNIT) store_four(own, times(load_square(F + BLOCK * p->diagonal[i]), own));
   }
-  for (i = p->states - 1; i >= 0; --i)
-    for (l = p->lower_start[i]; l < p->lower_start[i + 1]; ++l)
-      subtract_transposed(F + BLOCK * p->lower_block[l], x + STAGES * p->lower_row[l], x + STAGES * p->pivot[i]);
+  for (i = p->states - 1; i >= 0; --i) {
+    double *own = x + STAGES * p->pivot[i];
+    store_four(own, less_rows(p->right_start[i], p->right_start[i + 1], p->right_block, p->right_state, F, x, own));
+  }
 }
 
-enum { SINGULAR = 1, NO_MEMORY = 2 };
+static void solve_transposed_step(const Plan *p, const double *F, double *x) {
+  int i, k;
+  for (i = 0; i < p->states; ++i) {
+    double *own = x + STAGES * p->pivot[i];
+    store_four(own, less_columns(p->above_start[i], p->above_start[i + 1], p->above_block, p->above_state, F, x, own));
+  }
+  for (i = p->states - 1; i >= 0; --i) {
+    double *own = x + STAGES * p->pivot[i];
+    const Four rest =
+        less_columns(p->below_start[i], p->below_start[i + 1], p->below_block, p->below_state, F, x, own);
+    store_four(own, rest);
+    if (p->diagonal[i] != UNIT) {
+      Square inverse = load_square(F + BLOCK * p->diagonal[i]);
+      for (k = 0; k < STAGES; ++k) inverse.column[k] *= rest;
+      store_four(own, column_sums(inverse));
+    }
+  }
+}
 
-/* Factorise all steps.
+/* Factorise all steps; return 0 if a pivot is nearly singular.
  *
  * A        (steps, STAGES, entries)
  * factors  (steps, blocks, BLOCK) */
 EXPORT int collocation_factorise(long steps, const int *plan, const double *h, const double *A, const double *tableau,
                                  double *factors) {
   const Plan p = read_plan(plan);
-  const long size = (long)p.blocks * BLOCK;
-  Block *N = malloc(p.blocks * sizeof(Block));
-  int code = N ? 0 : NO_MEMORY;
-  long first;
-  for (first = 0; first < steps && !code; first += LANES) {
-    const long valid = steps - first < LANES ? steps - first : LANES;
-    if (factorise(&p, valid, h + first, A + first * STAGES * p.entries, tableau, N, factors + first * size))
-      code = SINGULAR;
-  }
-  free(N);
-  return code;
+  long step;
+  for (step = 0; step < steps; ++step)
+    if (!factorise(&p, h[step], A + step * STAGES * p.entries, tableau, factors + step * p.blocks * BLOCK)) return 0;
+  return 1;
 }
 
-/* x' = A x + f from x at the start, which becomes x at the end.
+/* x' = A x + f from x at the start, which becomes x at the end; return 0 if a pivot is nearly singular.
  *
+ * kept     whether factors holds those of all steps; else it has room for one step, which is factorised on the way
  * f        (steps, STAGES, states)
  * stages   (steps, STAGES, states)
  * edges    (steps + 1, states) x at the ends of the steps
  * work     (STAGES states) */
-EXPORT void collocation_forward(long steps, const int *plan, const double *h, const double *A, const double *tableau,
-                                const double *factors, const double *f, double *x, double *stages, double *edges,
-                                double *work) {
+EXPORT int collocation_forward(long steps, const int *plan, const double *h, const double *A, const double *tableau,
+                               double *factors, int kept, const double *f, double *x, double *stages, double *edges,
+                               double *work) {
   const Plan p = read_plan(plan);
-  const double *b = tableau + BLOCK;
+  const double *d = tableau + BLOCK + STAGES;
+  const Square a = load_square(tableau);
   long step;
-  int i, k, r;
+  int i, r;
   memcpy(edges, x, p.states * sizeof(double));
   for (step = 0; step < steps; ++step) {
     const double *force = f + step * STAGES * p.states;
-    double *stage = stages + step * STAGES * p.states;
-    for (i = 0; i < STAGES; ++i) {
-      const double *a = A + (STAGES * step + i) * p.entries;
-      for (r = 0; r < p.states; ++r) work[STAGES * r + i] = force[i * p.states + r];
-      for (k = 0; k < p.entries; ++k) work[STAGES * p.entry_row[k] + i] += a[k] * x[p.entry_column[k]];
-    }
-    solve_step(&p, factors + step * p.blocks * BLOCK, work);
+    double *stage = stages + step * STAGES * p.states, *F = factors + (kept ? step * p.blocks * BLOCK : 0);
+    if (!kept && !factorise(&p, h[step], A + step * STAGES * p.entries, tableau, F)) return 0;
     for (r = 0; r < p.states; ++r) {
-      const double *rate = work + STAGES * r;
-      for (i = 0; i < STAGES; ++i)
-        stage[i * p.states + r] = x[r] + h[step] * (tableau[4 * i] * rate[0] + tableau[4 * i + 1] * rate[1]
-                                                    + tableau[4 * i + 2] * rate[2] + tableau[4 * i + 3] * rate[3]);
-      x[r] += h[step] * (b[0] * rate[0] + b[1] * rate[1] + b[2] * rate[2] + b[3] * rate[3]);
+      const double own[STAGES] = { force[r], force[p.states + r], force[2 * p.states + r], force[3 * p.states + r] };
+      store_four(work + STAGES * r, x[r] + h[step] * times(a, own));
+    }
+    solve_step(&p, F, work);
+    for (r = 0; r < p.states; ++r) {
+      double change = 0.0;
+      for (i = 0; i < STAGES; ++i) {
+        stage[i * p.states + r] = work[STAGES * r + i];
+        change += d[i] * (work[STAGES * r + i] - x[r]);
+      }
+      x[r] += change;
     }
     memcpy(edges + (step + 1) * p.states, x, p.states * sizeof(double));
   }
+  return 1;
 }
 
-/* a' = -A' a - f from a at the end, which becomes a at the start; arguments as above. */
-EXPORT void collocation_backward(long steps, const int *plan, const double *h, const double *A, const double *tableau,
-                                 const double *factors, const double *f, double *a, double *stages, double *edges,
-                                 double *work) {
+/* a' = -A' a - f from a at the end, which becomes a at the start; arguments as above.
+ *
+ * The discrete adjoint of the steps above: M' V = d a + h b f, then a + the sum of V, as d adds up to nothing. */
+EXPORT int collocation_backward(long steps, const int *plan, const double *h, const double *A, const double *tableau,
+                                double *factors, int kept, const double *f, double *a, double *stages, double *edges,
+                                double *work) {
   const Plan p = read_plan(plan);
-  const double *b = tableau + BLOCK;
+  const double *b = tableau + BLOCK, *d = b + STAGES;
   long step;
-  int i, j, k, r;
+  int i, r;
   memcpy(edges + steps * p.states, a, p.states * sizeof(double));
   for (step = steps - 1; step >= 0; --step) {
     const double *force = f + step * STAGES * p.states;
-    double *stage = stages + step * STAGES * p.states;
+    double *stage = stages + step * STAGES * p.states, *F = factors + (kept ? step * p.blocks * BLOCK : 0);
+    if (!kept && !factorise(&p, h[step], A + step * STAGES * p.entries, tableau, F)) return 0;
     for (r = 0; r < p.states; ++r)
-      for (i = 0; i < STAGES; ++i) {
-        double sum = b[i] * a[r];
-        for (j = 0; j < STAGES; ++j) sum += h[step] * tableau[STAGES * j + i] * b[j] * force[j * p.states + r];
-        work[STAGES * r + i] = sum;
-      }
-    solve_transposed_step(&p, factors + step * p.blocks * BLOCK, work);
-    for (i = 0; i < STAGES; ++i) {
-      const double *at = A + (STAGES * step + i) * p.entries;
-      for (k = 0; k < p.entries; ++k) a[p.entry_column[k]] += h[step] * at[k] * work[STAGES * p.entry_row[k] + i];
-      for (r = 0; r < p.states; ++r) {
-        stage[i * p.states + r] = work[STAGES * r + i] / b[i];
-        a[r] += h[step] * b[i] * force[i * p.states + r];
-      }
+      for (i = 0; i < STAGES; ++i) work[STAGES * r + i] = d[i] * a[r] + h[step] * b[i] * force[i * p.states + r];
+    solve_transposed_step(&p, F, work);
+    for (r = 0; r < p.states; ++r) {
+      const double *v = work + STAGES * r, *column = tableau;
+      for (i = 0; i < STAGES; ++i, column += STAGES)
+        stage[i * p.states + r] = ((column[0] * v[0] + column[1] * v[1]) + (column[2] * v[2] + column[3] * v[3])) / b[i];
+      a[r] += (v[0] + v[1]) + (v[2] + v[3]);
     }
     memcpy(edges + step * p.states, a, p.states * sizeof(double));
   }
+  return 1;
 }
