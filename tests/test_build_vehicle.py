@@ -19,13 +19,18 @@ from ascentwind.runners.build.vehicle_numbers import STEPS
 
 AS504 = built_in_vehicles()["as504"]
 COARSE = 10.0  # s between rows
+VEHICLE, CONSTRUCTION = "vehicle.toml", "construction.toml"
 
 
 @pytest.fixture(scope="module")
 def built(tmp_path_factory):
-    """AS-504 built anew as it ships: numbers, folder and the steps done."""
-    out, steps = tmp_path_factory.mktemp("built") / "as504", []
-    numbers, written = build_vehicle(AS504, out, progress=steps.append)
+    """AS-504 built anew as it ships, with its load-relief sensors: numbers, folder and the steps done."""
+    made, steps = tmp_path_factory.mktemp("built"), []
+    out, folder = made / "as504", made / "raw"
+    shutil.copytree(AS504, folder)
+    with (folder / VEHICLE).open("a") as file:
+        file.write((AS504 / "load_relief.toml").read_text())
+    numbers, written = build_vehicle(folder, out, progress=steps.append)
     return numbers, out, written, steps
 
 
@@ -37,8 +42,8 @@ def test_shipped_tables_are_the_output_of_the_build(built):
     """Every table that vehicle.toml names and no hand wrote; digits are nine, sums of other processors another 1e-8."""
     _, out, written, steps = built
     assert steps == list(STEPS)
-    named = {entry.file for entry in table_entries(read_vehicle_file(AS504 / "vehicle.toml")).values()}
-    assert {p.name for p in written} == named and len(named) == 14
+    named = {entry.file for entry in table_entries(read_vehicle_file(out / VEHICLE)).values()}
+    assert {p.name for p in written} == named and len(named) == 16
     for path in written:
         shipped, found = columns(AS504 / path.name), columns(path)
         assert list(shipped) == list(found), path.name
@@ -119,7 +124,6 @@ def edit(file: Path, old: str, new: str) -> None:
     file.write_text(text.replace(old, new, 1))
 
 
-VEHICLE, CONSTRUCTION = "vehicle.toml", "construction.toml"
 EVENT = 'figure 5-3"\nevents = ["center_engine_cutoff"]'
 MASSES = "construction/masses.csv"
 REFUSED = {
@@ -137,6 +141,28 @@ REFUSED = {
     "unlisted event": (VEHICLE, EVENT, 'figure 5-3"', r"tables\.propulsion.*'thrust' jumps at center.*write events"),
     "missing file": (CONSTRUCTION, f'file = "{MASSES}"', 'file = "construction/mass.csv"', r"mass\.csv"),
 }
+
+
+def test_sensor_beyond_the_tip_is_refused(folder):
+    sensors = (folder / "load_relief.toml").read_text()
+    assert "position_m = 105.156" in sensors
+    with (folder / VEHICLE).open("a") as file:
+        file.write(sensors.replace("position_m = 105.156", "position_m = 105.2"))
+    with pytest.raises(DataError, match=r"'control\.angle_of_attack\.position_m'.* from -5\.588 to 105\.156 m"):
+        build_vehicle(folder, spacing=COARSE)
+
+
+def test_modes_at_a_sensor_are_those_of_the_tank_beside_it(built):
+    """The accelerometer is 0.1 m from the attach point of S-II LOX, as far as the bending tables' slope reaches."""
+    numbers, out, _, _ = built
+    sensor = columns(out / "accelerometer_modes.csv")
+    for i in (1, 2):
+        mode = columns(out / f"bending_{i}.csv")
+        near = mode["displacement_at_sii_lox"] + mode["slope_at_sii_lox"] * (
+            43.2 - numbers.slosh["sii_lox"].attach_point
+        )
+        np.testing.assert_allclose(sensor[f"displacement_{i}"], near, atol=5e-4)
+        np.testing.assert_allclose(sensor[f"slope_{i}"], mode["slope_at_sii_lox"], atol=5e-5)
 
 
 @pytest.mark.parametrize("case", REFUSED)

@@ -22,6 +22,7 @@ from .tables import Columns, table_text, vehicle_tables
 from .vehicle_numbers import Progress, VehicleNumbers, compute_vehicle
 
 SMALLEST_JUMP = 1e-3  # of a column's largest value, across the two rows beside an event
+POSITION_TOLERANCE = 1e-6  # m
 EVENT_TOLERANCE = 0.5 * EVENT_MARGIN  # beyond, rows beside the event would stand on one side of it
 
 
@@ -124,15 +125,23 @@ def check_agreement(toml: Path, file: VehicleFile, construction: Construction) -
     for tank in sorted(sloshing ^ named):
         where = "sloshes in " + CONSTRUCTION_FILE if tank in sloshing else "is no sloshing tank of " + CONSTRUCTION_FILE
         refuse(f"'{tank}' {where}; {'add' if tank in sloshing else 'remove'} its [[slosh]]", "slosh")
+    aft, forward = (x - construction.gimbal_station for x in (construction.aft_end, construction.forward_end))
+    for name, sensor in file.control.load_relief.items():
+        if not aft - POSITION_TOLERANCE <= sensor.position_m <= forward + POSITION_TOLERANCE:
+            refuse(
+                f"is {sensor.position_m:g} m forward of the gimbal plane, but {CONSTRUCTION_FILE} has a vehicle "
+                f"from {aft:g} to {forward:g} m",
+                f"control.{name}.position_m",
+            )
     for i, load in enumerate(file.loads):
-        near = [s for s in construction.load_stations if abs(s - load.station_m) < 1e-6]
+        near = [s for s in construction.load_stations if abs(s - load.station_m) < POSITION_TOLERANCE]
         if not near:
             refuse(
                 f"{load.station_m:g} m is not one of load_stations_m in {CONSTRUCTION_FILE}; add it there",
                 f"loads.{i}.station_m",
             )
         forward = construction.forward_of_gimbal(load.station_m)
-        if load.forward_of_gimbal_m is not None and abs(load.forward_of_gimbal_m - forward) > 1e-6:
+        if load.forward_of_gimbal_m is not None and abs(load.forward_of_gimbal_m - forward) > POSITION_TOLERANCE:
             refuse(
                 f"is {load.forward_of_gimbal_m:g}, but the gimbal plane of {CONSTRUCTION_FILE} makes it {forward:g}; "
                 "correct it",
@@ -189,6 +198,7 @@ def table_entries(file: VehicleFile) -> dict[str, TableEntry]:
         "tables.loads_along_vehicle": tables.loads_along_vehicle,
         **{f"bending.{i}.table": mode.table for i, mode in enumerate(file.bending)},
         **{f"slosh.{tank.name}.table": tank.table for tank in file.slosh},
+        **{f"control.{name}.modes": sensor.modes for name, sensor in file.control.load_relief.items()},
         **{f"loads.{load.output}.table": load.table for load in file.loads},
         **{f"loads.{load.output}.local": load.local for load in file.loads},
     }

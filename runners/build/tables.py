@@ -66,6 +66,11 @@ def vehicle_tables(numbers: VehicleNumbers, file: VehicleFile) -> dict[str, tupl
                 ("attach_point", "m"): found.attach_point,
             },
         )
+    for name, sensor in file.control.load_relief.items():
+        if sensor.modes is not None:
+            label = f"bending modes at the {name.replace('_', ' ')} sensor"
+            note = f"{label}, {sensor.position_m:g} m forward of the gimbal plane"
+            tables[sensor.modes.file] = note, time | _sensor(numbers, sensor.position_m)
     for load in file.loads:
         station = int(np.argmin(np.abs(numbers.stations + construction.gimbal_station - load.station_m)))
         forward = numbers.stations[station]
@@ -104,11 +109,10 @@ def _rigid(numbers: VehicleNumbers) -> Columns:
 def _bending(numbers: VehicleNumbers, mode: int) -> Columns:
     modes, construction = numbers.modes, numbers.construction
     sensor = construction.forward_of_gimbal(construction.sensor_station)
-    shapes = list(zip(modes.displacement[:, mode], modes.rotation[:, mode], strict=True))
+    shapes = modes.displacement[:, mode], modes.rotation[:, mode]
 
     def at(points: Array | float, which: int) -> Array:
-        points = np.broadcast_to(points, modes.time.shape)
-        return np.array([np.interp(x, modes.x, shape[which]) for x, shape in zip(points, shapes, strict=True)])
+        return _along_beam(numbers, shapes[which], points)
 
     points = {tank: found.attach_point for tank, found in numbers.slosh.items()}
     force = numbers.line.total(numbers.intensity * numbers.displacement[:, mode])
@@ -122,6 +126,22 @@ def _bending(numbers: VehicleNumbers, mode: int) -> Columns:
         **{(f"displacement_at_{tank}", "1"): at(x, 0) for tank, x in points.items()},
         **{(f"slope_at_{tank}", "1/m"): at(x, 1) for tank, x in points.items()},
     }
+
+
+def _sensor(numbers: VehicleNumbers, position: float) -> Columns:
+    """Return the columns of model/load_relief.py: mode_columns."""
+    found: Columns = {}
+    for mode in range(numbers.construction.bending_modes):
+        shapes = numbers.modes.displacement[:, mode], numbers.modes.rotation[:, mode]
+        for (name, unit), shape in zip((("displacement", "1"), ("slope", "1/m")), shapes, strict=True):
+            found[f"{name}_{mode + 1}", unit] = _along_beam(numbers, shape, position)
+    return found
+
+
+def _along_beam(numbers: VehicleNumbers, shapes: Array, points: Array | float) -> Array:
+    """Return shapes (t, points of the beam) at one point for each time, m forward of the gimbal plane."""
+    points = np.broadcast_to(points, numbers.modes.time.shape)
+    return np.array([np.interp(x, numbers.modes.x, shape) for x, shape in zip(points, shapes, strict=True)])
 
 
 def _load(numbers: VehicleNumbers, station: int) -> Columns:
