@@ -4,7 +4,9 @@
 
 Writes the table of docs/studies.md. Times are after load. Processor time is what the members themselves took, in the
 process that computed them. The overhead is what a run took beyond: by wall time over that time shared by the cores,
-which other work on the machine spoils, and by the processor time of all processes of the run, which it hardly does.
+which other work on the machine spoils, and by the processor time of all processes of the run. What Dask's processes do
+by the clock grows with wall time, so that other work on the machine lifts that too. The floor is the least that Dask
+can do with the same members: a task for each worker, nothing stored.
 """
 
 from __future__ import annotations
@@ -26,12 +28,22 @@ import psutil
 from ascentwind.runners import Study
 from ascentwind.runners.cores import available_cores
 from ascentwind.runners.parameter_study import run
+from ascentwind.runners.parameter_study.cluster import packed, work
+from ascentwind.runners.parameter_study.compute import chunks
 from ascentwind.runners.parameter_study.plan import read_plan
+from ascentwind.runners.parameter_study.quantities import resolve_quantities
+from ascentwind.runners.parameter_study.sampling import member_values
 
 ROOT = Path(__file__).parents[1]
 EXAMPLE = ROOT / "examples" / "as504_dispersion.toml"
 PAGE = ROOT / "docs" / "studies.md"
 BEGIN, END = "<!-- numbers begin -->", "<!-- numbers end -->"
+# what docs/studies.md recommends: a health check of each event loop 50 times a second, a sampling profiler, a monitor
+QUIET = {
+    "distributed.admin.tick.interval": "1s",
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.system-monitor.interval": "5s",
+}
 
 
 def plan_of(members: int):
@@ -72,6 +84,21 @@ def timed(
         run.compute_locally, run.compute_on_cluster = local, cluster
 
 
+def floor(plan, study: Study, scheduler: str, pids: list[int]) -> tuple[float, float, float]:
+    """Return the same times of the members on Dask by one task for each worker, nothing stored."""
+    from distributed import Client
+
+    quantities = resolve_quantities(study, plan)
+    values = [(chunk.first, chunk.values) for chunk in chunks(member_values(plan, quantities))]
+    task = run._task(study, plan, quantities)
+    start, used = time.perf_counter(), processor_time(pids)
+    with Client(scheduler, set_as_default=False) as client:
+        sent = client.submit(bytes, packed(study, task))
+        shares = [client.submit(work, sent, values[k :: len(pids)], pure=False) for k in range(len(pids))]
+        spent = [result.cpu_seconds for results, _ in client.gather(shares) for result in results]
+    return time.perf_counter() - start, sum(spent), processor_time(pids) - used
+
+
 def row(label: str, wall: float, members: float, everything: float, shared: int) -> str:
     by_wall, by_processor = wall / (members / shared) - 1, everything / members - 1
     return (
@@ -82,29 +109,39 @@ def row(label: str, wall: float, members: float, everything: float, shared: int)
 
 def speeds(members: int, workers: list[int], folder: Path) -> list[str]:
     """Return rows of the table: this machine, then clusters of several worker processes."""
+    study, cores = Study.load("as504"), available_cores()
+    plan = plan_of(members)
+    timed(plan_of(40), study, folder / "warm")
+    rows = [row(f"{cores} threads of this process", *timed(plan, study, folder / "here"), cores)]
+    print(rows[-1], flush=True)
+    for settings, words in ((QUIET, ""), ({}, ", Dask as it comes")):
+        for count in workers:
+            found, least = on_workers(plan, count, settings, study, folder)
+            shared = min(count, cores)
+            rows.append(row(f"{count} Dask worker processes{words}", *found, shared))
+            rows.append(row("its floor", *least, shared))
+            print("\n".join(rows[-2:]), flush=True)
+    return rows
+
+
+def on_workers(plan, count: int, settings: dict, study: Study, folder: Path) -> tuple[tuple, tuple]:
+    """Return times of a study on a cluster of this machine, and those of its floor."""
     import dask
     from distributed import LocalCluster
 
-    # Dask's own sampling profiler takes 3 % of a worker, its monitor and dashboard some more
-    dask.config.set({"distributed.worker.profile.enabled": False, "distributed.admin.system-monitor.interval": "5s"})
-    study, cores = Study.load("as504"), available_cores()
-    plan, warm = plan_of(members), plan_of(40)
-    timed(warm, study, folder / "warm")
-    rows = [row(f"{cores} threads of this process", *timed(plan, study, folder / "here"), cores)]
-    print(rows[-1], flush=True)
-    expected = (folder / "here" / "study.nc").read_bytes()
-    for count in workers:
-        with LocalCluster(
+    with (
+        dask.config.set(settings),
+        LocalCluster(
             n_workers=count, threads_per_worker=1, processes=True, dashboard_address=None, memory_limit=0
-        ) as cluster:
-            timed(plan_of(40 * count), study, folder / "warm", cluster.scheduler_address)  # every worker loads
-            pids = [nanny.pid for nanny in cluster.workers.values()]
-            found = timed(plan, study, folder / "there", cluster.scheduler_address, pids)
-        if (folder / "there" / "study.nc").read_bytes() != expected:
-            sys.exit(f"{count} workers give other bytes")
-        rows.append(row(f"{count} Dask worker processes", *found, min(count, cores)))
-        print(rows[-1], flush=True)
-    return rows
+        ) as cluster,
+    ):
+        timed(plan_of(40 * count), study, folder / "warm", cluster.scheduler_address)  # every worker loads
+        pids = [nanny.pid for nanny in cluster.workers.values()]
+        found = timed(plan, study, folder / "there", cluster.scheduler_address, pids)
+        least = floor(plan, study, cluster.scheduler_address, pids)
+    if (folder / "there" / "study.nc").read_bytes() != (folder / "here" / "study.nc").read_bytes():
+        sys.exit(f"{count} workers give other bytes")
+    return found, least
 
 
 def kills(count: int, folder: Path) -> str:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import signal
 import socket
 import sys
 
+import numpy as np
 import pytest
 from ascentwind.runners.parameter_study import cluster, run_parameter_study
 from ascentwind.runners.parameter_study.cluster import SchedulerError
-from ascentwind.runners.parameter_study.compute import chunks, compute_chunk
+from ascentwind.runners.parameter_study.compute import Chunk, chunks, compute_chunk
 from ascentwind.runners.parameter_study.plan import read_plan
 from ascentwind.runners.parameter_study.quantities import resolve_quantities
 from ascentwind.runners.parameter_study.run import _task
@@ -57,7 +59,9 @@ def deadly(study, task, chunk):
     return compute_chunk(study, task, chunk)
 
 
-def test_a_member_that_kills_its_worker_costs_no_other(as504, workers):
+@pytest.mark.parametrize("together", [1, 2], ids=["chunk by chunk", "both chunks in a task"])
+def test_a_member_that_kills_its_worker_costs_no_other(as504, workers, monkeypatch, together):
+    monkeypatch.setattr(cluster, "together", lambda *_: together)
     plan = read_plan(PLAN)
     quantities = resolve_quantities(as504, plan)
     task = _task(as504, plan, quantities)
@@ -98,6 +102,29 @@ def test_a_worker_killed_from_outside_is_replaced(as504, workers, tmp_path):
     assert found.data["status"].values.tolist() == 64 * [0]
     run_parameter_study(given, tmp_path / "here", study=as504)
     assert (tmp_path / "here" / "study.nc").read_bytes() == (tmp_path / "there" / "study.nc").read_bytes()
+
+
+def test_a_worker_loads_a_vehicle_once_for_several_plans(as504):
+    plan = read_plan(PLAN)
+    quantities = resolve_quantities(as504, plan)
+    task = _task(as504, plan, quantities)
+    values = member_values(plan, quantities)[:2]
+    cluster._loaded.cache_clear()
+    for times in ((20.0,), (30.0,)):
+        other = dataclasses.replace(task, times=times)
+        some, _ = cluster.work(cluster.packed(as504, other), [(0, values[:1]), (1, values[1:])])
+        whole = compute_chunk(as504, other, Chunk(0, values))
+        assert (np.concatenate([part.variance for part in some]) == whole.variance).all()
+    assert cluster._loaded.cache_info().misses == 1
+
+
+def test_chunks_in_a_task():
+    assert cluster.together(spent=0.0, computed=0, waiting=100, threads=2) == 1  # it is not known how long one takes
+    assert cluster.together(spent=5.0, computed=10, waiting=100, threads=2) == 4
+    assert cluster.together(spent=50.0, computed=10, waiting=100, threads=2) == 1
+    assert cluster.together(spent=0.0, computed=10, waiting=100, threads=2) == 25
+    assert cluster.together(spent=5.0, computed=10, waiting=9, threads=2) == 2  # the end is shared
+    assert cluster.together(spent=5.0, computed=10, waiting=3, threads=0) == 1
 
 
 def free_port() -> int:

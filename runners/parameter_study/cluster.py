@@ -7,11 +7,15 @@ import logging
 import pickle
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Generator, Iterable
+from functools import lru_cache
+from queue import Empty, SimpleQueue
 from typing import Any
 
 import casadi as ca
 import numpy as np
+from numpy.typing import NDArray
 
 from ...model.errors import AscentwindError
 from ...model.vehicle import Vehicle
@@ -25,7 +29,8 @@ log = logging.getLogger(__name__)
 CONNECT_SECONDS = 10.0
 WORKER_SECONDS = 60.0  # how long a cluster may be without workers
 LOOK_SECONDS = 2.0
-UNDER_WAY = 4  # chunks for each thread of the cluster
+UNDER_WAY = 2  # Dask tasks for each thread of the cluster: one at work, one waiting on the same worker
+TASK_SECONDS = 2.0  # of chunks in one Dask task, which itself costs client, scheduler and worker some 10 ms
 
 Compute = Callable[[Study, Task, Chunk], ChunkResult]
 
@@ -56,10 +61,9 @@ def compute_on_cluster(
             "a system of your own cannot be sent to a cluster, only a vehicle; leave the scheduler out to compute here"
         )
     distributed = _distributed()
-    packed = pickle.dumps((study.vehicle, study.executable.parameters))
     client = _connect(distributed, address)
     try:
-        yield from _Dispatch(distributed, client, address, study, task, packed, compute).run(list(missing))
+        yield from _Dispatch(distributed, client, address, study, task, packed(study, task, compute)).run(list(missing))
     except (distributed.CancelledError, distributed.comm.CommClosedError, OSError):
         raise SchedulerError(
             f"the connection to the scheduler at {address} was lost; stored members stay: start the cluster again "
@@ -67,6 +71,11 @@ def compute_on_cluster(
         ) from None
     finally:
         client.close(timeout=LOOK_SECONDS)
+
+
+def packed(study: Study, task: Task, compute: Compute = compute_chunk) -> bytes:
+    """Return all that ``work`` needs beside the values of members, so that it is not sent and read again with each."""
+    return pickle.dumps((pickle.dumps((study.vehicle, study.executable.parameters)), task, compute))
 
 
 def _distributed() -> Any:
@@ -104,16 +113,17 @@ def _no_workers(address: str, seconds: float) -> str:
 class _Dispatch:
     """Chunks under way on a cluster."""
 
-    def __init__(
-        self, distributed: Any, client: Any, address: str, study: Study, task: Task, packed: bytes, compute: Compute
-    ):
+    def __init__(self, distributed: Any, client: Any, address: str, study: Study, task: Task, sent: bytes):
         self.distributed, self.client, self.address = distributed, client, address
-        self.study, self.task, self.compute = study, task, compute
-        self.key = hashlib.sha256(packed).hexdigest()
+        self.study, self.task = study, task
+        self.key = hashlib.sha256(sent).hexdigest()
         # a task, not scattered data: a cluster can make it again when the worker that held it is lost
-        self.vehicle = client.submit(bytes, packed, key=f"ascentwind-vehicle-{self.key[:16]}", priority=10)
+        self.sent = client.submit(bytes, sent, key=f"ascentwind-vehicle-{self.key[:16]}", priority=10)
         self.identity = _identity(study)
         self.warned = False
+        self.done: SimpleQueue[Any] = SimpleQueue()
+        self.threads, self.asked = 0, -LOOK_SECONDS
+        self.spent, self.computed = 0.0, 0
 
     def run(self, waiting: list[Chunk]) -> Generator[tuple[Chunk, ChunkResult], None, None]:
         killed = []
@@ -134,42 +144,50 @@ class _Dispatch:
 
         Alone on the cluster a chunk cannot be blamed for the death of a worker that it shared with another.
         """
-        queue, running = waiting[::-1], {}
+        queue, running = deque(waiting), {}
         seen = time.monotonic()
         while queue or running:
-            while queue and len(running) < (UNDER_WAY * max(1, self._threads()) if at_once else 1):
-                chunk = queue.pop()
-                running[self._submit(chunk, alone=not at_once)] = chunk
-            done = self._done(list(running))
-            if self._threads():
+            threads = self._threads()
+            while queue and len(running) < (UNDER_WAY * max(1, threads) if at_once else 1):
+                size = together(self.spent, self.computed, len(queue), threads) if at_once else 1
+                some = [queue.popleft() for _ in range(size)]
+                running[self._submit(some, alone=not at_once)] = some
+            if threads:
                 seen = time.monotonic()
             elif time.monotonic() - seen > WORKER_SECONDS:
                 raise SchedulerError(_no_workers(self.address, WORKER_SECONDS))
-            for future in done:
-                yield running.pop(future), self._result(future)
-
-    def _done(self, running: list[Any]) -> set[Any]:
-        """Wait for a chunk, but not for ever."""
-        try:
-            with self.client.as_current():
-                return self.distributed.wait(running, timeout=LOOK_SECONDS, return_when="FIRST_COMPLETED").done
-        except TimeoutError:
-            return set()
+            try:
+                future = self.done.get(timeout=LOOK_SECONDS)
+            except Empty:
+                continue
+            some = running.pop(future)
+            results = self._result(future)
+            if results is not None:
+                self.spent += sum(r.cpu_seconds for r in results)
+                self.computed += len(results)
+            del future  # the cluster forgets it, and its result
+            yield from zip(some, results or [None] * len(some), strict=True)
 
     def _threads(self) -> int:
+        """Return the threads of all workers, asked for now and then: the scheduler describes every worker at length."""
         if self.client.status == "closed":
             raise OSError("it does not answer")
-        workers = self.client.scheduler_info(n_workers=-1).get("workers", {})
-        return sum(worker["nthreads"] for worker in workers.values())
+        if time.monotonic() - self.asked >= LOOK_SECONDS:
+            workers = self.client.scheduler_info(n_workers=-1).get("workers", {})
+            self.threads, self.asked = sum(worker["nthreads"] for worker in workers.values()), time.monotonic()
+        return self.threads
 
-    def _submit(self, chunk: Chunk, alone: bool) -> Any:
-        key = f"ascentwind-{self.key[:8]}-{id(self)}-{chunk.name}{'-alone' if alone else ''}"
-        return self.client.submit(work, self.vehicle, self.key, self.task, chunk, self.compute, pure=False, key=key)
+    def _submit(self, some: list[Chunk], alone: bool) -> Any:
+        key = f"ascentwind-{self.key[:8]}-{id(self)}-{some[0].name}{'-alone' if alone else ''}"
+        values = [(chunk.first, chunk.values) for chunk in some]
+        future = self.client.submit(work, self.sent, values, pure=False, key=key)
+        future.add_done_callback(self.done.put)
+        return future
 
-    def _result(self, future: Any) -> ChunkResult | None:
-        """Return the result of a chunk, None if its workers died."""
+    def _result(self, future: Any) -> list[ChunkResult] | None:
+        """Return the results of a Dask task, None if its workers died."""
         try:
-            result, identity = future.result()
+            results, identity = future.result()
         except self.distributed.KilledWorker:
             return None
         except (ImportError, AttributeError) as error:
@@ -177,7 +195,7 @@ class _Dispatch:
                 f"a worker cannot load what it is sent ({error}); install this ascentwind there"
             ) from None
         self._compare(identity)
-        return result
+        return results
 
     def _compare(self, identity: dict[str, str]) -> None:
         """Refuse results of another program, and say when another processor may change last digits."""
@@ -190,6 +208,24 @@ class _Dispatch:
         if identity["code"] != self.identity["code"] and not self.warned:
             self.warned = True
             log.warning("a worker has another compiler or processor than this machine: last digits may differ")
+
+
+def together(spent: float, computed: int, waiting: int, threads: int) -> int:
+    """Return how many chunks go into the next Dask task.
+
+    Parameters
+    ----------
+    spent : float
+        Processor time of the chunks computed so far, s.
+    computed, waiting : int
+        Chunks.
+    threads : int
+        Of the cluster; towards the end they share what is left, so that all end together.
+    """
+    if not computed:
+        return 1
+    long_enough = int(TASK_SECONDS * computed / max(spent, 1e-3 * computed))
+    return max(1, min(long_enough, waiting // (2 * max(1, threads))))
 
 
 def _joined(parts: list[ChunkResult]) -> ChunkResult:
@@ -210,18 +246,26 @@ def _identity(study: Study) -> dict[str, str]:
     }
 
 
-_studies: dict[str, tuple[Study, dict[str, str]]] = {}
 _loading = threading.Lock()
 
 
-def work(packed: bytes, key: str, task: Task, chunk: Chunk, compute: Compute) -> tuple[ChunkResult, dict[str, str]]:
-    """Compute a chunk on a worker, which loads a vehicle once; return with it what it was computed by."""
+def work(sent: bytes, some: list[tuple[int, NDArray[np.float64]]]) -> tuple[list[ChunkResult], dict[str, str]]:
+    """Compute chunks on a worker, which loads a vehicle once; return with them what they were computed by."""
     with _loading:
-        if key not in _studies:
-            vehicle: Vehicle
-            vehicle, parameters = pickle.loads(packed)
-            study = Study.from_vehicle(vehicle)
-            study = Study(study.executable.with_numbers(parameters=parameters), vehicle)
-            _studies[key] = (study, _identity(study))
-    study, identity = _studies[key]
-    return compute(study, task, chunk), identity
+        vehicle, task, compute = _opened(sent)
+        study, identity = _loaded(vehicle)
+    return [compute(study, task, Chunk(*numbers)) for numbers in some], identity
+
+
+@lru_cache(maxsize=8)
+def _opened(sent: bytes) -> tuple[bytes, Task, Compute]:
+    return pickle.loads(sent)
+
+
+@lru_cache(maxsize=8)
+def _loaded(sent: bytes) -> tuple[Study, dict[str, str]]:
+    vehicle: Vehicle
+    vehicle, parameters = pickle.loads(sent)
+    study = Study.from_vehicle(vehicle)
+    study = Study(study.executable.with_numbers(parameters=parameters), vehicle)
+    return study, _identity(study)
