@@ -28,7 +28,9 @@ if TYPE_CHECKING:
     from .study import Study
 
 QUANTITIES: tuple[str, ...] = ("std", "variance", "mean", "mean_plus_3sigma")
-STRUCTURAL = re.compile(r"^options\.|(count|number|order|synthesis|modes?|tanks?|masses|sources?|states?|loads?|outputs?)$")
+STRUCTURAL = re.compile(
+    r"^options\.|(count|number|order|synthesis|modes?|tanks?|masses|sources?|states?|loads?|outputs?)$"
+)
 
 
 class ZeroQuantityError(AscentwindError):

@@ -127,6 +127,8 @@ def _shown(value: float, factor: float, digits: int = 3) -> str:
 
 
 def _interval(numbers: list[float], factor: float) -> str:
-    """Return a number with its interval below; an end that too few members leave open is not written."""
+    """Return a number with its interval below, one end of which too few members may leave open."""
     value, low, high = (_shown(x, factor) for x in numbers)
-    return f"{value}\n{'' if low == '-' else low}…{'' if high == '-' else high}"
+    if "-" in (low, high):
+        return f"{value}\n" + (f"over {low}" if low != "-" else f"under {high}" if high != "-" else "")
+    return f"{value}\n{low}…{high}"
