@@ -82,6 +82,7 @@ def test_spread_csv_is_what_numpy_makes_of_the_stored_members(dispersed):
         assert row["sample_std"] == pytest.approx(sample.std(ddof=1), rel=1e-9)
         half = 1.959964 * sample.std(ddof=1) / np.sqrt(sample.size)
         assert row["sample_mean_high"] - row["sample_mean"] == pytest.approx(half, rel=1e-5)
+        assert row["sample_mean"] - row["sample_mean_low"] == pytest.approx(half, rel=1e-5)
         for percent in (1, 5, 50, 95, 99):
             assert row[f"percentile_{percent}"] == pytest.approx(np.percentile(sample, percent), rel=1e-9)
         ordered = np.sort(sample)
@@ -271,6 +272,9 @@ def test_grids_are_shown_at_their_values(study, tmp_path):
     assert labelled(figure)[:2] == ("gain", "tau")
     assert "peak mean + 3σ x (1)" in labelled(figure)
     assert line(figure, "nominal").ravel().tolist() == [GAIN, TAU]
+    (contours,) = figure.axes[0].collections
+    highest = [path for path in contours.get_paths() if len(path.vertices)][-1]
+    assert [4.0, 3.0] in highest.vertices.tolist()  # where gain and tau are largest
     points = {tuple(p) for p in line(figure, "computed").T.tolist()}
     assert points == {(4.0, 1.0), (4.0, 3.0), (2.0, 1.0), (2.0, 3.0)}
 
