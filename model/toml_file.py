@@ -71,7 +71,7 @@ def validated(data: Mapping[str, Any], model: type[File], file: Path | None = No
         elif first["type"] == "missing":
             why = "is missing; add it"
         else:
-            why = str(first["msg"]).removeprefix("Value error, ")
+            why = str(first["msg"]).removeprefix("Value error, ").replace("valid tuple", "valid list")
             if not isinstance(first["input"], dict | list):
                 why += f" (found {first['input']!r})"
         raise DataError(why, file=file, column=".".join(location) or None) from None

@@ -9,6 +9,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from ..model.errors import DataError
 from .terminal import VehicleArgument, console, progress_bar
 
 WIDE = 150  # columns: tables that a narrow terminal wraps but a file keeps whole
@@ -55,6 +56,8 @@ def equations(
     from .output import write_whole
     from .study import Study
 
+    if by is not None and of is None:
+        raise DataError(f"--by {by} needs --of, the equation to differentiate; 4-1 to 4-13, an output or a state")
     study = Study.load(vehicle)
     if page is not None:
         text = equations_page(study)

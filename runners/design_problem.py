@@ -61,6 +61,7 @@ class LoadReliefProblem:
 
     def __post_init__(self):
         study = self.study
+        study._require_linear_mean("a design")
         object.__setattr__(self, "times", tuple(sorted({float(t) for t in self.times})))
         object.__setattr__(self, "frozen_times", tuple(sorted({float(t) for t in self.frozen_times})))
         study._check_times(list(self.times))

@@ -22,6 +22,7 @@ from ..model.errors import ParameterValueError
 from .collocation_grid import STAGES
 from .sensitivity import Request, end_time, parameter_rows
 from .sensitivity_gradient import AdjointPair, Combination
+from .stability import warn_if_unstable
 from .start_covariance import start_functions
 from .statistics import provenance
 
@@ -45,6 +46,7 @@ def second_derivatives(
     if not 1 <= len(rows) <= MOST:
         raise ParameterValueError(f"{len(rows)} parameters were asked for; second derivatives are for 1 to {MOST}")
     at, _ = end_time(study, request, time)
+    warn_if_unstable(study.executable, at)
     pair = request.pair(study, at)
     factors = request.factors(pair)
     gradient = pair.gradient(*factors).parameters[rows]

@@ -22,12 +22,15 @@ from .stability import warn_if_unstable
 from .start_covariance import start_share
 from .statistics import COMBINED, provenance
 from .table_knots import knot_sensitivities
+from .times import seconds
 
 if TYPE_CHECKING:
     from .study import Study
 
 QUANTITIES: tuple[str, ...] = ("std", "variance", "mean", "mean_plus_3sigma")
-STRUCTURAL = re.compile(r"(count|number|order|modes?|tanks?|masses|sources?|states?|loads?|outputs?)$")
+STRUCTURAL = re.compile(
+    r"^options\.|(count|number|order|synthesis|modes?|tanks?|masses|sources?|states?|loads?|outputs?)$"
+)
 
 
 class ZeroQuantityError(AscentwindError):
@@ -183,7 +186,7 @@ def end_time(study: Study, request: Request, time: float | str) -> tuple[float, 
             raise TimeRangeError(f"'{time}' is not a time; give seconds or 'peak'")
         time, at_limit = peak_time(study, request)
     else:
-        time, at_limit = float(time), False
+        time, at_limit = seconds(time), False
     study._check_times([time])
     check_end_time(study, time)
     return time, at_limit
@@ -211,7 +214,7 @@ def parameter_rows(system: LinearSystem, wanted: Iterable[str] | None) -> list[i
     if wanted is None:
         return list(range(len(names)))
     rows = []
-    for name in dict.fromkeys(wanted):
+    for name in dict.fromkeys([wanted] if isinstance(wanted, str) else wanted):
         if name not in names:
             if name in system.structure or STRUCTURAL.search(name):
                 raise StructuralParameterError(name)

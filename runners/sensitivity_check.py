@@ -16,6 +16,7 @@ import xarray as xr
 
 from ..codegen.compiled import ExecutableSystem
 from ..model.assemble import vehicle_tables
+from ..model.errors import ParameterValueError
 from ..model.vehicle import Vehicle
 from ..model.wind_filter import ShapingFilter
 from .adjoint import AdjointSolver
@@ -78,6 +79,8 @@ def check_sensitivity(
     rows: int = 0,
 ) -> xr.Dataset:
     """See :meth:`Study.check_sensitivity`."""
+    if rows < 0:
+        raise ParameterValueError(f"{rows} rows cannot be checked; give 0 or more")
     request = Request.of(study, response, source, quantity)
     found = sensitivity(study, response, time, source, quantity, parameters, elasticity=False)
     time = float(found.attrs["t2_s"])

@@ -17,6 +17,7 @@ from .sensitivity import Request, check_end_time, parameter_rows
 from .sensitivity_gradient import AdjointPair
 from .stability import warn_if_unstable
 from .statistics import provenance
+from .times import end_times
 
 if TYPE_CHECKING:
     from .study import Study
@@ -31,10 +32,10 @@ def sensitivities(
     parameters: Iterable[str] | None,
 ) -> xr.Dataset:
     """See :meth:`Study.sensitivities`."""
-    ends = sorted({float(t) for t in times})
+    ends = end_times(times)
     study._check_times(ends)
     check_end_time(study, ends[0])
-    names = list(study.system.output_names) if responses is None else list(dict.fromkeys(responses))
+    names = study._responses(responses)
     requests = [Request.of(study, name, source, quantity) for name in names]
     rows = parameter_rows(study.system, parameters)
     warn_if_unstable(study.executable, ends[-1])

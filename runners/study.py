@@ -20,6 +20,7 @@ from .stability import warn_if_unstable
 from .statistics import COMBINED, ResponseStatistics, weighting_dataset, weighting_family
 from .study_numbers import StudyNumbers
 from .sweep_engine import SweepOptions, batch, sweep, sweep_of
+from .times import end_times
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +81,7 @@ class Study(StudyNumbers):
         -----
         UnstableSystemWarning
         """
-        times = sorted({float(t) for t in times})
+        times = end_times(times)
         self._check_times(times)
         wanted = self._responses(responses)
         warn_if_unstable(self.executable, times[-1])
@@ -119,7 +120,7 @@ class Study(StudyNumbers):
         if not parameter_sets:
             raise ParameterValueError("a batch needs at least one set of parameter values")
         self._require_linear_mean("a batch")
-        ends = sorted({float(t) for t in times})
+        ends = end_times(times)
         self._check_times(ends)
         options = options or SweepOptions(relative_tolerance=1e-4)
         values = [self._parameter_values(changes) for changes in parameter_sets]
@@ -150,7 +151,7 @@ class Study(StudyNumbers):
         xarray.Dataset
             As :meth:`weighting_function`, with a dimension ``time`` in front; zero for t after the end time.
         """
-        ends = sorted({float(t) for t in times})
+        ends = end_times(times)
         self._check_times(ends)
         self._check_spacing(spacing)
         tolerance = (options or SweepOptions()).relative_tolerance
@@ -261,6 +262,7 @@ class Study(StudyNumbers):
         ------
         UnknownNameError, StructuralParameterError, TimeRangeError, DirectNoiseError, ZeroQuantityError
         """
+        self._require_linear_mean("a sensitivity")
         return sensitivities(self, responses, times, source, quantity, parameters)
 
     def second_derivatives(
@@ -296,6 +298,7 @@ class Study(StudyNumbers):
             For none or more than ten parameters.
         UnknownNameError, StructuralParameterError, TimeRangeError, DirectNoiseError, ZeroQuantityError
         """
+        self._require_linear_mean("a second derivative")
         return second_derivatives(self, response, time, parameters, source, quantity)
 
     def check_sensitivity(

@@ -105,9 +105,13 @@ class StudyNumbers:
         for name, value in changes.items():
             if name not in names:
                 raise UnknownNameError("parameter", name, names)
-            if not np.isfinite(value) or (name.rpartition(".")[2] in POSITIVE and value <= 0):
-                raise ParameterValueError(f"parameter '{name}' cannot be {value:g}; give a finite, sensible number")
-            values[names.index(name)] = float(value)
+            try:
+                number = float(value)
+            except (TypeError, ValueError, OverflowError):
+                raise ParameterValueError(f"parameter '{name}' cannot be {value!r:.40}; give a number") from None
+            if not np.isfinite(number) or (name.rpartition(".")[2] in POSITIVE and number <= 0):
+                raise ParameterValueError(f"parameter '{name}' cannot be {number:g}; give a finite, sensible number")
+            values[names.index(name)] = number
         return values
 
     def with_wind(self, wind: WindModel | ShapingFilter) -> Self:
@@ -197,6 +201,8 @@ class StudyNumbers:
         return f"the last row of {shortest.file.name} at {shortest.last:g} s; extend the table or ask for less"
 
     def _responses(self, responses: Iterable[str] | None) -> list[str]:
+        if isinstance(responses, str):
+            responses = [responses]
         names = list(self.system.output_names if responses is None else dict.fromkeys(responses))
         self.system.refuse_direct_noise(names)
         return names

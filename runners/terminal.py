@@ -9,11 +9,14 @@ from typing import Annotated, Any
 import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.table import Table
 
 from ..model.errors import DataError
 
-console = Console()
-errors = Console(stderr=True)
+console = Console(emoji=False)  # '40:100:5' is no emoji
+errors = Console(stderr=True, emoji=False)
+
+WIDEST = 1000  # columns
 
 VehicleArgument = Annotated[str, typer.Argument(help="A shipped vehicle ('ascentwind vehicles') or a vehicle folder.")]
 
@@ -49,3 +52,9 @@ def progress_bar() -> Progress:
         console=console,
         transient=True,
     )
+
+
+def print_whole(table: Table, console: Console) -> None:
+    """Print a table as wide as it is: a narrow terminal wraps its lines, but no number is cut off."""
+    needed = Console(width=WIDEST, emoji=False).measure(table).maximum
+    Console(file=console.file, width=max(console.width, needed), emoji=False).print(table)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Literal
 
 import numpy as np
@@ -35,6 +35,32 @@ def parse_times(text: str) -> list[float]:
     if (stop - start) / step > MOST:
         raise TimeRangeError(f"'{text}' names more than {MOST} times; take a larger step")
     return [float(t) for t in start + step * np.arange(int(np.floor((stop - start) / step + 1e-9)) + 1)]
+
+
+def end_times(times: Iterable[float]) -> list[float]:
+    """Return end times in seconds, increasing, each once.
+
+    Raises
+    ------
+    TimeRangeError
+        Something among them is not a number.
+    """
+    if isinstance(times, str) or not isinstance(times, Iterable):
+        raise TimeRangeError(f"{times!r} is not a list of times; give seconds, such as [75.0]")
+    return sorted({seconds(t) for t in times})
+
+
+def seconds(time: float) -> float:
+    """Return a time as a float.
+
+    Raises
+    ------
+    TimeRangeError
+    """
+    try:
+        return float(time)
+    except (TypeError, ValueError, OverflowError):
+        raise TimeRangeError(f"{time!r} is not a time; give seconds") from None
 
 
 def spread_over(times: Sequence[float], count: int) -> list[float]:

@@ -153,6 +153,8 @@ def test_times_are_read():
         (["run", "as505"], "did you mean 'as504'"),
         (["run", "as504", "--times", "5:20:5"], "before the start at 10 s"),
         (["run", "as504", "--times", "x"], "does not name times"),
+        (["run", "as504", "--times", "60:70"], "such as 40:100:5"),
+        (["equations", "as504", "--by", "mass"], "--by mass needs --of"),
         (["run", "as504", "--method", "euler"], "method 'euler' is not known"),
         (["run", "as504", "--set", "options.ful_coupling=true"], "did you mean 'full_coupling'"),
         (["run", "as504", "--set", "options.full_coupling"], "write KEY=VALUE"),

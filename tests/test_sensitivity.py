@@ -6,8 +6,10 @@ import casadi as ca
 import numpy as np
 import pytest
 from ascentwind.model import LinearSystem, define_system
-from ascentwind.model.errors import DirectNoiseError, TimeRangeError, UnknownNameError
+from ascentwind.model.errors import DirectNoiseError, ParameterValueError, TimeRangeError, UnknownNameError
 from ascentwind.runners import Study
+from ascentwind.runners.design_problem import LoadReliefProblem
+from ascentwind.runners.parameter_study import run_parameter_study
 from ascentwind.runners.sensitivity import StructuralParameterError, UndefinedElasticityWarning, ZeroQuantityError
 from ascentwind.runners.sensitivity_check import central_difference
 from scipy.optimize import minimize_scalar
@@ -252,3 +254,47 @@ def test_direct_noise_is_refused():
     system = define_system("d", time=t, states={"x": (x, -x + n)}, noises={"n": n}, outputs={"y": x + n})
     with pytest.raises(DirectNoiseError):
         found(system, 1.0)
+
+
+@pytest.mark.parametrize("time", [None, [75.0], "75"])
+def test_what_is_no_time_is_refused(as504, time):
+    with pytest.raises(TimeRangeError, match="is not a time; give seconds"):
+        as504.sensitivity("bending_moment", time)
+    with pytest.raises(TimeRangeError, match=r"is not a (list of times|time); give seconds"):
+        as504.sensitivities(["bending_moment"], [75.0, "peak"] if time == "75" else time and [time])
+
+
+def test_a_name_alone_is_a_list_of_one(as504):
+    found = as504.sensitivities("engine_angle", [12.0], parameters="control.T1.gain")
+    assert (found["response"].values.tolist(), found["parameter"].values.tolist()) == (
+        ["engine_angle"],
+        ["control.T1.gain"],
+    )
+
+
+def test_options_have_no_derivative_and_rows_are_counted(as504):
+    with pytest.raises(StructuralParameterError, match="'options.full_coupling' is structure"):
+        as504.sensitivity("bending_moment", 75.0, parameters=["options.full_coupling"])
+    with pytest.raises(ParameterValueError, match="-1 rows cannot be checked"):
+        as504.check_sensitivity("bending_moment", 75.0, rows=-1)
+
+
+@pytest.mark.parametrize("value", [None, "much", 10**400, float("nan")])
+def test_a_value_that_is_no_number_is_refused(as504, value):
+    with pytest.raises(ParameterValueError, match="'control.T1.gain' cannot be "):
+        as504.with_parameters({"control.T1.gain": value})
+
+
+def test_nothing_follows_the_linear_mean_in_secret(cache, tmp_path):
+    """A vehicle that asks for the nonlinear mean is refused where only the linear one is known."""
+    study = Study.load("as504", changes={"options.mean_response": "nonlinear"})
+    gain = "control.T1.gain"
+    plan = {"format": 1, "title": "t", "times": "30", "grid": {"quantity": [{"name": gain, "values": [1.0]}]}}
+    for ask in (
+        lambda: study.sensitivities(["bending_moment"], [30.0]),
+        lambda: study.second_derivatives("bending_moment", 30.0, [gain]),
+        lambda: run_parameter_study(plan, tmp_path, study=study),
+        lambda: LoadReliefProblem(study, {gain: (0.5, 2.0)}, times=(30.0,)),
+    ):
+        with pytest.raises(ParameterValueError, match="follows the linear mean response"):
+            ask()

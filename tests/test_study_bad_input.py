@@ -51,6 +51,17 @@ CASES = {
     "not finite": (grid({"name": "gain", "values": [float("nan")]}), r"finite"),
     "no quantities": (grid(), r"at least 1 item"),
     "half a range": (plan(one_at_a_time={"quantity": [{"name": "gain", "low": 1.0}]}), r"low and high, or plus_minus"),
+    "no responses": (dispersion(9, GAIN) | {"responses": []}, r"'responses'.*at least 1 item"),
+    "times that are none": (dispersion(9, GAIN) | {"times": "1:2"}, r"'times': '1:2' does not name times; write START"),
+    "tolerance": (dispersion(9, GAIN) | {"relative_tolerance": 0.9}, r"'relative_tolerance'.*less than or equal to"),
+    "text for a list": (grid({"name": "gain", "values": "1.0"}), r"values.*should be a valid list \(found '1.0'\)"),
+    "an option": (grid({"name": "options.full_coupling", "values": [1.0]}), r"is structure, not a number"),
+    "more members than memory": (dispersion(10**11, GAIN), r"members.*less than or equal to 10000000"),
+    "more values than memory": (grid({"name": "gain", "linspace": [0, 1, 10**10]}), r"linspace.*less than or equal to"),
+    "more combinations than memory": (
+        grid(*({"name": name, "linspace": [1, 2, 10**4]} for name in ("gain", "tau"))),
+        r"has 100000000 combinations, more than 10000000",
+    ),
     "too much to store": (dispersion(3_000_000, GAIN) | {"times": "1:50:0.5"}, r"GB.*fewer times"),
 }
 
@@ -95,3 +106,23 @@ def test_a_table_without_its_prefix_and_errors_of_a_file(as504, tmp_path):
     file.write_text("format = ")
     with pytest.raises(DataError, match=r"mass.toml: is not valid TOML"):
         read_plan(file)
+
+
+def test_a_source_named_twice_is_stored_once(study, tmp_path):
+    found = run_parameter_study(dispersion(2, GAIN) | {"sources": ["gust", "gust"]}, tmp_path, study=study)
+    assert found.data["source"].values.tolist() == ["gust", "combined"]
+
+
+def test_a_factor_that_a_table_cannot_have_fails_its_member(as504, tmp_path):
+    """The mass of a file must be positive; the mean wind may be turned round."""
+    given = {"format": 1, "title": "t", "times": "30"}
+    for name, values, status in (
+        ("tables.mass", [1.0, 0.0, -1.0], [0, 2, 2]),
+        ("tables.wind.mean", [-1.0, 0.0], [0, 0]),
+    ):
+        grid = {"quantity": [{"name": name, "values": values}]}
+        found = run_parameter_study(given | {"grid": grid}, tmp_path / name, study=as504)
+        assert found.data["status"].values.tolist() == status
+    grid = {"quantity": [{"name": "tables.thrust", "values": [-1.0]}]}
+    found = run_parameter_study(given | {"grid": grid}, tmp_path / "thrust", study=as504)
+    assert "a factor of -1 on 'tables.thrust' leaves it no sense" in found.data["reason"].values[0]

@@ -18,7 +18,8 @@ def changes(result: ParameterStudy) -> xr.Dataset:
     -------
     xarray.Dataset
         ``change`` and ``first_order_change`` (measure, response, quantity, end: 'low' and 'high'), SI, from the
-        nominal study; NaN where a member failed. ``value`` (quantity, end) and ``nominal`` (measure, response).
+        nominal study; NaN where a member failed. ``value`` and ``status`` (quantity, end: 0 computed, 1 unstable,
+        2 failed) and ``nominal`` (measure, response).
 
     Raises
     ------
@@ -40,8 +41,13 @@ def changes(result: ParameterStudy) -> xr.Dataset:
             "change": (dims, change.reshape(*nominal.shape, d, 2)),
             "first_order_change": (dims, gradients(result, measured)[..., None] * step),
             "value": (("quantity", "end"), value),
+            "status": (("quantity", "end"), result.data["status"].values.reshape(d, 2)),
             "nominal": measured["nominal"],
             "peak_time": measured["peak_time"],
         },
-        {"quantity": result.data["quantity"].values, "end": ["low", "high"]},
+        {
+            "quantity": result.data["quantity"].values,
+            "quantity_unit": ("quantity", [q.unit for q in result.quantities]),
+            "end": ["low", "high"],
+        },
     )

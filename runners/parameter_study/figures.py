@@ -8,8 +8,9 @@ from matplotlib import rc_context
 from matplotlib.figure import Figure
 from scipy import stats
 
-from ..figures import COLORS, STYLE, words
+from ..figures import COLORS, STYLE, words, wrapped
 from ..statistics import COMBINED
+from .compute import COMPUTED, FAILED, STATUS, UNSTABLE
 from .measures import PEAK, displayed
 from .run import ParameterStudy
 
@@ -17,22 +18,32 @@ BINS = 40
 
 
 def histogram_figure(result: ParameterStudy, measured: xr.Dataset, found: xr.Dataset, response: str) -> Figure:
-    """Return the distribution of the peak mean + 3 sigma beside the first-order normal one."""
+    """Return the distribution of the peak mean + 3 sigma beside the first-order normal one.
+
+    The axes are those of the stable members; unstable ones beyond them are counted.
+    """
     factor, unit = displayed(measured, response)
     at = found.sel(measure=PEAK, response=response)
     values = np.sort(factor * measured["sample"].sel(measure=PEAK, response=response).values)
     centre, sigma = (factor * at[name].item() for name in ("first_order_mean", "first_order_std"))
+    stable = result.data["status"].values[measured["member"].values] == COMPUTED
+    of_stable = factor * measured["sample"].sel(measure=PEAK, response=response).values[stable]
+    first, last = (of_stable.min(), of_stable.max()) if stable.any() else (values[0], values[-1])
+    inside = values[(values >= first) & (values <= last)]
+    beyond = f", {values.size - inside.size} beyond the axis" if inside.size < values.size else ""
     with rc_context(STYLE):
         figure = Figure(figsize=(10.0, 4.6), layout="constrained")
         density, cumulative = figure.subplots(1, 2)
-        density.hist(
-            values, bins=min(BINS, max(5, values.size // 10)), density=True, color=COLORS["wind"], alpha=0.45,
-            label=f"{values.size} members: σ {factor * at['sample_std'].item():.3g} {unit}",
+        heights, edges = np.histogram(inside, bins=min(BINS, max(5, values.size // 10)))
+        density.stairs(
+            heights / (values.size * np.diff(edges)), edges, fill=True, color=COLORS["wind"], alpha=0.45,
+            label=f"{values.size} members{beyond}: σ {factor * at['sample_std'].item():.3g} {unit}",
         )  # fmt: skip
         steps = np.arange(1, values.size + 1) / values.size
         cumulative.step(values, 100 * steps, where="post", color=COLORS["wind"], label="members")
         if np.isfinite(sigma) and sigma > 0:
-            x = np.linspace(min(values[0], centre - 3.5 * sigma), max(values[-1], centre + 3.5 * sigma), 300)
+            x = np.linspace(min(first, centre - 3.5 * sigma), max(last, centre + 3.5 * sigma), 300)
+            first, last = float(x[0]), float(x[-1])
             label = f"first order: σ {sigma:.3g} {unit}"
             density.plot(x, stats.norm.pdf(x, centre, sigma), "--", color=COLORS[COMBINED], lw=2, label=label)
             below = stats.norm.cdf(x, centre, sigma)
@@ -40,6 +51,8 @@ def histogram_figure(result: ParameterStudy, measured: xr.Dataset, found: xr.Dat
         for axes in (density, cumulative):
             axes.axvline(factor * at["nominal"].item(), color="black", lw=1, ls=":", label="nominal")
             axes.set_xlabel(f"peak of mean + 3σ {words(response)} ({unit})")
+            if last > first:
+                axes.set_xlim(first - 0.03 * (last - first), last + 0.03 * (last - first))
         high = at.sel(percent=95.0)
         if np.isfinite(high["percentile_low"]) and np.isfinite(high["percentile_high"]):
             edges = [[factor * (high["percentile"] - high["percentile_low"]).item()],
@@ -48,13 +61,13 @@ def histogram_figure(result: ParameterStudy, measured: xr.Dataset, found: xr.Dat
                 factor * high["percentile"].item(), 95, xerr=edges, fmt="o", ms=4, color="black", capsize=3,
                 label="95th percentile, 95 % interval",
             )  # fmt: skip
-        density.set_ylabel(f"density (1/{unit})")
+        density.set_ylabel(f"density (1/({unit}))" if " " in unit else f"density (1/{unit})")
         cumulative.set_ylabel("members below (%)")
         top = density.get_ylim()[1]
         density.set_ylim(0, 1.25 * top)
-        density.legend(fontsize=9, loc="upper right")
+        density.legend(fontsize=9, loc="upper right", frameon=True)
         cumulative.legend(fontsize=9, loc="lower right")
-        figure.suptitle(f"{result.plan.title}\nPeak of mean + 3σ {words(response)}")
+        figure.suptitle(f"{wrapped(result.plan.title)}\nPeak of mean + 3σ {words(response)}")
     return figure
 
 
@@ -84,46 +97,66 @@ def band_figure(result: ParameterStudy, found: xr.Dataset, response: str) -> Fig
                 label="5 to 95 %, first order",
             )  # fmt: skip
         axes.margins(y=0.12)
+        stable = (result.data["status"].values == COMPUTED)[result.computed]
+        if stable.any() and not stable.all():
+            shown = np.concatenate([upper[stable].ravel(), nominal])
+            axes.set_ylim(shown.min() - 0.12 * np.ptp(shown), shown.max() + 0.12 * np.ptp(shown))
         axes.set(xlabel="flight time (s)", ylabel=f"mean + 3σ {words(response)} ({unit})")
-        axes.set_title(f"{result.plan.title}\nMean + 3σ {words(response)} of {upper.shape[0]} members", fontsize=11)
+        axes.set_title(
+            f"{wrapped(result.plan.title)}\nMean + 3σ {words(response)} of {upper.shape[0]} members", fontsize=11
+        )
         axes.legend(fontsize=9)
     return figure
 
 
 def tornado_figure(result: ParameterStudy, found: xr.Dataset, response: str) -> Figure:
-    """Return the changes of the peak mean + 3 sigma, the largest on top, with the first-order ones as marks."""
+    """Return the changes of the peak mean + 3 sigma, the largest on top, with the first-order ones as marks.
+
+    Members that are unstable or failed are named; the axis is that of the others.
+    """
     part = found.sel(measure=PEAK, response=response)
     factor, unit = displayed(found, response)
     change, predicted = (factor * part[name].values for name in ("change", "first_order_change"))
-    size = np.nanmax(np.abs(np.concatenate([change, predicted], axis=1)), axis=1, initial=0.0)
+    status = part["status"].values
+    stable, predicted = (np.where(status == COMPUTED, x, np.nan) for x in (change, predicted))
+    size = np.nanmax(np.abs(np.concatenate([stable, predicted], axis=1)), axis=1, initial=0.0)
     order = np.argsort(-size, kind="stable")
     place = np.arange(order.size)
     with rc_context(STYLE):
         figure = Figure(figsize=(9.0, 1.9 + 0.42 * order.size), layout="constrained")
         axes = figure.subplots()
         for k, (end, color) in enumerate((("low", COLORS["wind"]), ("high", COLORS[COMBINED]))):
-            axes.barh(place, np.nan_to_num(change[order, k]), color=color, alpha=0.75, label=f"at the {end} value")
+            axes.barh(place, np.nan_to_num(stable[order, k]), color=color, alpha=0.75, label=f"at the {end} value")
         axes.plot(predicted[order].T.ravel(), np.tile(place, 2), "d", color="black", ms=5, ls="", label="first order")
         labels = []
-        for q in order:
+        for row, q in enumerate(order):
             low, high = part["value"].values[q]
-            labels.append(f"{part['quantity'].values[q]}\n{low:.4g} … {high:.4g}")
+            shown = f"{low:.4g} … {high:.4g} {part['quantity_unit'].values[q]}".removesuffix(" 1")
+            labels.append(f"{part['quantity'].values[q]}\n{shown}")
+            other = [f"{STATUS[s]} at the {end} value" for s, end in zip(status[q], ("low", "high"), strict=True) if s]
+            axes.annotate(
+                ", ".join(other), (1, row), xycoords=("axes fraction", "data"), ha="right", va="center",
+                fontsize=8.5, color="red",
+                bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0},
+            )  # fmt: skip
         axes.set_yticks(place, labels, fontsize=8.5)
         axes.invert_yaxis()
         axes.axvline(0, color="black", lw=0.6)
         axes.grid(axis="y", visible=False)
         nominal = factor * part["nominal"].item()
         axes.set_xlabel(f"change of the peak mean + 3σ {words(response)} from {nominal:.4g} {unit} ({unit})")
-        axes.set_title(result.plan.title, fontsize=11)
-        axes.legend(fontsize=9, loc="best")
+        axes.set_title(wrapped(result.plan.title), fontsize=11)
+        figure.legend(fontsize=9, loc="outside lower center", ncols=3)
     return figure
 
 
 def grid_figure(result: ParameterStudy, measured: xr.Dataset, response: str) -> Figure:
-    """Return the peak mean + 3 sigma over one quantity as a line, over two as contours."""
+    """Return the peak mean + 3 sigma over one quantity as a line, over two as contours; of stable members."""
     factor, unit = displayed(measured, response)
-    peak = np.full(result.data.sizes["member"], np.nan)
+    status = result.data["status"].values
+    peak = np.full(status.size, np.nan)
     peak[measured["member"].values] = factor * measured["sample"].sel(measure=PEAK, response=response).values
+    peak[status != COMPUTED] = np.nan
     values = result.data["value"].values
     labels = [q.name if q.unit == "1" else f"{q.name} ({q.unit})" for q in result.quantities]
     label = f"peak mean + 3σ {words(response)} ({unit})"
@@ -134,24 +167,27 @@ def grid_figure(result: ParameterStudy, measured: xr.Dataset, response: str) -> 
         if len(labels) == 1:
             order = np.argsort(values[:, 0])
             axes.plot(values[order, 0], peak[order], "o-", color=COLORS["wind"], lw=1.8, label="computed")
+            axes.ticklabel_format(axis="y", useOffset=False)
             shown = factor * measured["nominal"].sel(measure=PEAK, response=response).item()
             axes.plot(nominal[0], shown, "s", color="black", label="nominal")
             axes.set(xlabel=labels[0], ylabel=label)
-            axes.legend()
+            points, place = np.stack([values[:, 0], np.zeros(status.size)]), axes.get_xaxis_transform()
         else:
             x, y = (np.unique(values[:, k]) for k in (0, 1))
             grid = np.full((y.size, x.size), np.nan)
             grid[np.searchsorted(y, values[:, 1]), np.searchsorted(x, values[:, 0])] = peak
-            shape = (min(x.size, y.size) >= 2) and np.isfinite(grid).any()
-            if shape:
+            if min(x.size, y.size) >= 2 and np.isfinite(grid).any():
                 filled = axes.contourf(x, y, np.ma.masked_invalid(grid), levels=14, cmap="viridis")
                 figure.colorbar(filled, ax=axes, label=label)
-            axes.plot(values[:, 0], values[:, 1], ".", color="white", ms=3, mec="black", mew=0.4)
+            mark = {"ms": 4, "color": "white", "mec": "black", "mew": 0.5, "clip_on": False}
+            axes.plot(*values[status == COMPUTED].T, "o", label="computed", **mark)
             axes.plot(*nominal, "s", color=COLORS[COMBINED], label="nominal")
-            failed = ~np.isfinite(peak)
-            if failed.any():
-                axes.plot(values[failed, 0], values[failed, 1], "x", color="red", label="failed")
             axes.set(xlabel=labels[0], ylabel=labels[1])
-            axes.legend(loc="upper right", frameon=True)
-        axes.set_title(result.plan.title, fontsize=11)
+            points, place = values.T, axes.transData
+        for other, mark in ((UNSTABLE, "^"), (FAILED, "x")):
+            if (status == other).any():
+                at = points[:, status == other]
+                axes.plot(*at, mark, color="red", clip_on=False, transform=place, label=STATUS[other])
+        figure.legend(loc="outside lower center", ncols=4)
+        axes.set_title(wrapped(result.plan.title), fontsize=11)
     return figure

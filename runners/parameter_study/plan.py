@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import prod
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
-from ...model.errors import DataError
+from ...model.errors import DataError, TimeRangeError
 from ...model.toml_file import Section, read_toml, validated
+from ..sweep_engine import LARGEST_TOLERANCE, LEAST_TOLERANCE
+from ..times import parse_times
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 QuantityName = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_.]*$")]
+Names = Annotated[tuple[str, ...], Field(min_length=1)]
 Kind = Literal["grid", "one_at_a_time", "dispersion"]
+
+MOST = 10_000_000  # members: more would fill the memory before their size is known
 
 
 class PlannedQuantity(Section):
@@ -39,13 +45,18 @@ class GridQuantity(PlannedQuantity):
     """``values``, or ``linspace = [first, last, count]``."""
 
     values: tuple[Finite, ...] = ()
-    linspace: tuple[Finite, Finite, Annotated[int, Field(ge=2)]] | None = None
+    linspace: tuple[Finite, Finite, Annotated[int, Field(ge=2, le=MOST)]] | None = None
 
     @model_validator(mode="after")
     def _one_list(self) -> Self:
         if bool(self.values) == (self.linspace is not None):
             raise ValueError("needs either values = [...] or linspace = [first, last, count]")
         return self
+
+    @property
+    def count(self) -> int:
+        """How many values it has."""
+        return len(self.values) if self.linspace is None else self.linspace[2]
 
     def axis(self) -> list[float]:
         """Return the values."""
@@ -111,6 +122,13 @@ class Grid(Section):
 
     quantity: Annotated[tuple[GridQuantity, ...], Field(min_length=1)]
 
+    @model_validator(mode="after")
+    def _not_too_many(self) -> Self:
+        members = prod(q.count for q in self.quantity)
+        if members > MOST:
+            raise ValueError(f"has {members} combinations, more than {MOST}; take fewer values")
+        return self
+
 
 class OneAtATime(Section):
     """Each quantity at its low and at its high value, the others nominal."""
@@ -121,7 +139,7 @@ class OneAtATime(Section):
 class Dispersion(Section):
     """Random members."""
 
-    members: Annotated[int, Field(ge=2)]
+    members: Annotated[int, Field(ge=2, le=MOST)]
     seed: Annotated[int, Field(ge=0)]
     sampling: Literal["random", "latin_hypercube", "sobol"] = "latin_hypercube"
     quantity: Annotated[tuple[DispersedQuantity, ...], Field(min_length=1)]
@@ -138,12 +156,26 @@ class ParameterStudyPlan(Section):
     title: str
     vehicle: str | None = None
     times: str | None = None
-    responses: tuple[str, ...] | None = None
-    sources: tuple[str, ...] | None = None
-    relative_tolerance: Positive = 1e-4
+    responses: Names | None = None
+    sources: Names | None = None
+    relative_tolerance: Annotated[float, Field(ge=LEAST_TOLERANCE, le=LARGEST_TOLERANCE)] = 1e-4
     grid: Grid | None = None
     one_at_a_time: OneAtATime | None = None
     dispersion: Dispersion | None = None
+
+    @field_validator("times")
+    @classmethod
+    def _named(cls, text: str) -> str:
+        try:
+            parse_times(text)
+        except TimeRangeError as error:
+            raise ValueError(str(error)) from None
+        return text
+
+    @field_validator("responses", "sources")
+    @classmethod
+    def _once(cls, names: tuple[str, ...] | None) -> tuple[str, ...] | None:
+        return names and tuple(dict.fromkeys(names))
 
     @model_validator(mode="after")
     def _one_kind(self) -> Self:

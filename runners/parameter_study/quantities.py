@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...codegen.compiled import ExecutableSystem
-from ...model.errors import DataError, suggestion
+from ...model.errors import DataError, ParameterValueError, suggestion
 from ...model.tables import TableGroup
 from ..sensitivity import STRUCTURAL
 from ..study import Study
@@ -17,6 +17,9 @@ from .plan import ParameterStudyPlan, PlannedQuantity
 
 TABLES = "tables."
 MEAN_GROUP = "mean"  # tables that follow from the others
+# last word of the names of tables that a vehicle's files may not hold negative, the first also not zero
+POSITIVE = ("mass", "moment_of_inertia", "relative_velocity", "frequency", "generalized_mass")
+NOT_NEGATIVE = ("dynamic_pressure", "thrust", "control_thrust")
 
 
 @dataclass(frozen=True)
@@ -54,7 +57,10 @@ def resolve_quantities(study: Study, plan: ParameterStudyPlan) -> tuple[Quantity
     ------
     DataError
         Unknown names with the nearest one, structure, a target named twice, a nominal value that is zero or not common.
+    ParameterValueError
+        The vehicle asks for the nonlinear mean, which members do not have.
     """
+    study._require_linear_mean("a parameter study")
     taken: dict[str, str] = {}
     found = []
     for i, planned in enumerate(plan.quantities):
@@ -125,9 +131,17 @@ def member_numbers(study: Study, quantities: Sequence[Quantity], row: NDArray[np
             if target in parameters:
                 changes[target] = value * parameters[target].value if quantity.relative else value
             else:
-                factors[target.removeprefix(TABLES)] = value
+                factors[target.removeprefix(TABLES)] = _checked_factor(target, value)
     groups = tuple(_scaled(group, factors) for group in study.executable.groups)
     return study.executable.with_numbers(groups=groups, parameters=study._parameter_values(changes))
+
+
+def _checked_factor(table: str, factor: float) -> float:
+    """Refuse a factor that makes of a table what its file may not hold."""
+    last = table.rpartition(".")[2]
+    if (last in POSITIVE and factor <= 0) or (last in NOT_NEGATIVE and factor < 0):
+        raise ParameterValueError(f"a factor of {factor:g} on '{table}' leaves it no sense; give a positive one")
+    return factor
 
 
 def _scaled(group: TableGroup, factors: dict[str, float]) -> TableGroup:

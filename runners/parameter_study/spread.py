@@ -80,11 +80,12 @@ def _moments(samples: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
     """Return mean and std over the last axis with intervals; that of the std by the fourth moment."""
     n = samples.shape[-1]
     z = float(stats.norm.ppf(0.5 + CONFIDENCE / 2))
-    mean, std = samples.mean(axis=-1), samples.std(axis=-1, ddof=1)
+    size = np.maximum(np.abs(samples).max(axis=-1), np.finfo(float).tiny)  # squares of an unstable member overflow
+    mean, std = samples.mean(axis=-1), size * (samples / size[..., None]).std(axis=-1, ddof=1)
     error = std / np.sqrt(n)
-    fourth = ((samples - mean[..., None]) ** 4).mean(axis=-1)
-    variance_error = np.sqrt(np.maximum(fourth - std**4 * (n - 3) / (n - 1), 0.0) / n)
-    std_error = np.divide(variance_error, 2 * std, out=np.zeros_like(std), where=std > 0)
+    scaled = np.divide(samples - mean[..., None], std[..., None], out=np.zeros_like(samples), where=std[..., None] > 0)
+    fourth = (scaled**4).mean(axis=-1)
+    std_error = 0.5 * std * np.sqrt(np.maximum(fourth - (n - 3) / (n - 1), 0.0) / n)
     return {
         "sample_mean": mean,
         "sample_mean_low": mean - z * error,
