@@ -19,6 +19,7 @@ from .study import Study
 
 CLOSE = 2e-3  # of a peak: end times this close below it are verified too
 VERIFIED = 1e-6
+ON_A_BOUND = 1e-12  # of the span between bounds
 
 
 class InfeasibleDesignError(DesignProblemError):
@@ -249,6 +250,7 @@ def _position(problem: LoadReliefProblem, values: Mapping[str, float]) -> NDArra
 
 
 def _values(problem: LoadReliefProblem, u: NDArray[np.float64]) -> dict[str, float]:
+    u = np.where(np.abs(u - np.round(u)) < ON_A_BOUND, np.round(u), u)  # 0 and 1 are the bounds
     return dict(zip(problem.names, (problem.low + problem.span * u).tolist(), strict=True))
 
 

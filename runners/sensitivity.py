@@ -49,6 +49,18 @@ class StructuralParameterError(UnknownNameError):
         )
 
 
+class TableParameterError(UnknownNameError):
+    """A derivative by a parameter was asked for with the name of a table, which is many numbers."""
+
+    def __init__(self, name: str):
+        self.kind, self.name, self.known = "parameter", name, ()
+        Exception.__init__(
+            self,
+            f"'{name}' is a table, not a parameter: every sensitivity has its derivatives over time "
+            "(table_derivative), by rows (knot_derivative) and as a whole (table_elasticity); leave it out",
+        )
+
+
 class UndefinedElasticityWarning(AscentwindWarning):
     """Parameters that are zero have a derivative but no elasticity."""
 
@@ -218,6 +230,8 @@ def parameter_rows(system: LinearSystem, wanted: Iterable[str] | None) -> list[i
         if name not in names:
             if name in system.structure or STRUCTURAL.search(name):
                 raise StructuralParameterError(name)
+            if any(name in group.names for group in system.tables):
+                raise TableParameterError(name)
             raise UnknownNameError("parameter", name, names)
         rows.append(names.index(name))
     return rows

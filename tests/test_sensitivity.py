@@ -10,7 +10,12 @@ from ascentwind.model.errors import DirectNoiseError, ParameterValueError, TimeR
 from ascentwind.runners import Study
 from ascentwind.runners.design_problem import LoadReliefProblem
 from ascentwind.runners.parameter_study import run_parameter_study
-from ascentwind.runners.sensitivity import StructuralParameterError, UndefinedElasticityWarning, ZeroQuantityError
+from ascentwind.runners.sensitivity import (
+    StructuralParameterError,
+    TableParameterError,
+    UndefinedElasticityWarning,
+    ZeroQuantityError,
+)
 from ascentwind.runners.sensitivity_check import central_difference
 from scipy.optimize import minimize_scalar
 
@@ -220,6 +225,11 @@ def test_names_are_checked_and_the_nearest_offered(as504):
 def test_structure_has_no_derivative(as504, name):
     with pytest.raises(StructuralParameterError, match=f"'{name}' is structure, not a number"):
         as504.sensitivity("bending_moment", 75.0, parameters=["control.T1.gain", name])
+
+
+def test_a_table_is_not_a_parameter(as504):
+    with pytest.raises(TableParameterError, match="'mass' is a table, not a parameter: .*table_elasticity"):
+        as504.sensitivity("bending_moment", 75.0, parameters=["mass"])
 
 
 def test_times_are_checked(as504):

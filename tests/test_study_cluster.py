@@ -7,6 +7,7 @@ import os
 import signal
 import socket
 import sys
+import time
 
 import numpy as np
 import pytest
@@ -138,8 +139,21 @@ def test_an_unreachable_scheduler(as504, tmp_path, monkeypatch):
     address = f"tcp://127.0.0.1:{free_port()}"
     with pytest.raises(SchedulerError, match=rf"no scheduler answers at {address} within 1 s.*'dask scheduler' runs"):
         run_parameter_study(PLAN, tmp_path, study=as504, scheduler=address)
-    with pytest.raises(SchedulerError, match=r"no scheduler answers at nonsense://x.*tcp://host:8786"):
-        run_parameter_study(PLAN, tmp_path, study=as504, scheduler="nonsense://x")
+
+
+@pytest.mark.parametrize(
+    ("address", "why"),
+    [
+        ("nonsense://x:1", "unknown address scheme 'nonsense'"),
+        ("localhost", "missing port"),
+        ("tcp://localhost:port", "invalid literal"),
+    ],
+)
+def test_what_is_no_address_is_refused_at_once(as504, tmp_path, address, why):
+    begin = time.monotonic()
+    with pytest.raises(SchedulerError, match=rf"is not the address of a scheduler \(.*{why}.*tcp://host:8786"):
+        run_parameter_study(PLAN, tmp_path, study=as504, scheduler=address)
+    assert time.monotonic() - begin < cluster.CONNECT_SECONDS
 
 
 def test_a_scheduler_without_workers(as504, tmp_path, monkeypatch):

@@ -88,6 +88,13 @@ def _distributed() -> Any:
 
 def _connect(distributed: Any, address: str) -> Any:
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # its tracebacks; ours say the same in a sentence
+    address = address if "://" in address else f"tcp://{address}"
+    try:
+        distributed.comm.get_address_host_port(address, strict=True)  # else a client tries for long, then says much
+    except ValueError as error:
+        raise SchedulerError(
+            f"'{address}' is not the address of a scheduler ({error}); give one such as tcp://host:8786"
+        ) from None
     try:
         client = distributed.Client(address, timeout=CONNECT_SECONDS, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:
