@@ -165,9 +165,10 @@ class ParameterStudyPlan(Section):
 
     @field_validator("times")
     @classmethod
-    def _named(cls, text: str) -> str:
+    def _readable(cls, text: str | None) -> str | None:
         try:
-            parse_times(text)
+            if text is not None:
+                parse_times(text)
         except TimeRangeError as error:
             raise ValueError(str(error)) from None
         return text
