@@ -109,7 +109,9 @@ def discretise(executable: ExecutableSystem, times: Sequence[float], substep: fl
         C.append(y * scale)
         mean.append(C[-1] @ state + G @ inputs[:, 0])
     start = [system.start_covariance_matrix(name, executable.parameters) for name in system.sources]
-    steps = Steps(_root(np.array(start) / np.outer(scale, scale)), transition, _root(added), np.array(C))
+    steps = Steps(
+        symmetric_root(np.array(start) / np.outer(scale, scale)), transition, symmetric_root(added), np.array(C)
+    )
     return Discretisation(np.asarray(times, float), steps, added, np.array(mean))
 
 
@@ -201,7 +203,7 @@ def _compose(first: tuple[NDArray, ...], second: tuple[NDArray, ...]) -> tuple[N
     return Phi2 @ Phi1, A @ Q1 @ A.swapaxes(-1, -2) + Q2, (Phi2 @ b1[..., None])[..., 0] + b2
 
 
-def _root(Q: NDArray) -> NDArray[np.float64]:
+def symmetric_root(Q: NDArray) -> NDArray[np.float64]:
     """Return the symmetric square roots of covariance matrices; unlike other roots they are unique."""
     size = np.sqrt(np.maximum(np.einsum("...ii->...i", Q), 0.0))
     unit = np.where(size > 0, size, 1.0)

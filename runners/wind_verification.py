@@ -24,6 +24,7 @@ from ..model.wind_statistics import WindStatistics
 from .adjoint import AdjointSolver
 from .altitude_grid import transition
 from .covariance_intervals import share_inside
+from .discretisation import symmetric_root
 from .frozen_poles import largest_pole
 from .integration import IntegratorOptions
 
@@ -197,10 +198,10 @@ def simulate_profiles(
     low = float(shaping_filter.altitude[0])
     inner = shaping_filter.altitude[shaping_filter.altitude <= altitude.max()]
     grid = np.unique(np.concatenate([inner, np.maximum(altitude, low)]))
-    z = random.standard_normal((count, shaping_filter.order)) @ _root(shaping_filter.start_covariance).T
+    z = random.standard_normal((count, shaping_filter.order)) @ symmetric_root(shaping_filter.start_covariance).T
     wind = {grid[0]: z @ shaping_filter.at(grid[0])[2]}
     for h, (phi, added) in zip(grid[1:], _steps(shaping_filter, grid), strict=True):
-        z = z @ phi.T + random.standard_normal(z.shape) @ _root(added).T
+        z = z @ phi.T + random.standard_normal(z.shape) @ symmetric_root(added).T
         wind[h] = z @ shaping_filter.at(h)[2]
     return np.stack([wind[max(h, low)] for h in altitude], axis=1)
 
@@ -217,8 +218,3 @@ def ensemble_share_inside(
     profiles = simulate_profiles(shaping_filter, altitude, count, seed)
     # the mean is known to be zero: one degree of freedom more than the interval takes off
     return share_inside(covariance, profiles.T @ profiles / count, count + 1, confidence)
-
-
-def _root(covariance: NDArray) -> NDArray:
-    values, vectors = np.linalg.eigh(covariance)
-    return vectors * np.sqrt(np.maximum(values, 0.0))
