@@ -121,9 +121,10 @@ class CompiledCollocation:
         tableau = np.concatenate([TABLEAU.T.ravel(), WEIGHTS, FROM_STAGES])
         factors = np.empty((grid.steps.size if keep else 1, plan[1], STAGES**2))
         self._arrays = (plan, grid.steps, np.ascontiguousarray(A.values), tableau, factors)
-        self._regular = not keep or code.collocation_factorise(
-            ctypes.c_long(grid.steps.size), *map(_pointer, self._arrays)
-        )
+        self._regular = True
+        if keep:
+            steps = ctypes.c_long(grid.steps.size)
+            self._regular = bool(code.collocation_factorise(steps, *map(_pointer, self._arrays)))
 
     @cached_property
     def _exchanging(self) -> Collocation:

@@ -37,28 +37,32 @@ class ZeroQuantityError(AscentwindError):
     """A derivative or elasticity was asked for of a quantity that is zero, where it is not defined."""
 
 
-class StructuralParameterError(UnknownNameError):
+class NotAParameterError(UnknownNameError):
+    """A derivative was asked for with respect to something known that is not one number."""
+
+    why = ""
+
+    def __init__(self, name: str):
+        self.kind, self.name, self.known = "parameter", name, ()
+        Exception.__init__(self, f"'{name}' is {self.why}")
+
+
+class StructuralParameterError(NotAParameterError):
     """A derivative was asked for with respect to something that changes the equations, not a number in them."""
 
-    def __init__(self, name: str):
-        self.kind, self.name, self.known = "parameter", name, ()
-        Exception.__init__(
-            self,
-            f"'{name}' is structure, not a number: another value makes other equations, which have no derivative; "
-            "edit the vehicle file and compare the two vehicles",
-        )
+    why = (
+        "structure, not a number: another value makes other equations, which have no derivative; "
+        "edit the vehicle file and compare the two vehicles"
+    )
 
 
-class TableParameterError(UnknownNameError):
+class TableParameterError(NotAParameterError):
     """A derivative by a parameter was asked for with the name of a table, which is many numbers."""
 
-    def __init__(self, name: str):
-        self.kind, self.name, self.known = "parameter", name, ()
-        Exception.__init__(
-            self,
-            f"'{name}' is a table, not a parameter: every sensitivity has its derivatives over time "
-            "(table_derivative), by rows (knot_derivative) and as a whole (table_elasticity); leave it out",
-        )
+    why = (
+        "a table, not a parameter: every sensitivity has its derivatives over time (table_derivative), by rows "
+        "(knot_derivative) and as a whole (table_elasticity); leave it out"
+    )
 
 
 class UndefinedElasticityWarning(AscentwindWarning):

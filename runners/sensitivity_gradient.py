@@ -34,20 +34,14 @@ class Gradient:
     ----------
     value : float
     parameters : (n_p,) array
-    times : (k,) array
-        Nodes, s.
-    weights : (k,) array
-        Of the nodes in an integral over time, s.
     tables : (k, n_v) array
-        Derivative with respect to a table's value at a time, per second.
+        Derivative with respect to a table's value at a node, per second.
     tables_at_end : (n_v,) array
         Weight of the delta that the latter holds at t = t2.
     """
 
     value: float
     parameters: NDArray[np.float64]
-    times: NDArray[np.float64]
-    weights: NDArray[np.float64]
     tables: NDArray[np.float64]
     tables_at_end: NDArray[np.float64]
 
@@ -195,7 +189,7 @@ class AdjointPair:
             by_start = start_functions(self.executable.system, self.sources)[1](p, self.adjoint_at_start)
             parameters = parameters + variance_factor * np.array(by_start, float).ravel()
         value = variance_factor * self.variance + mean_factor * self.mean
-        return Gradient(value, parameters, self.times, self.weights, found.tables, found.tables_at_end)
+        return Gradient(value, parameters, found.tables, found.tables_at_end)
 
     def mean_path(self, on_tables: NDArray, on_tables_end: NDArray) -> MeanPath | None:
         """Give what the variance owes to the tables of the mean response to the mean's states and outputs."""

@@ -73,8 +73,8 @@ def start_share(vehicle: Vehicle | None, pair: AdjointPair, factor: float) -> St
         return None
     first = pair.executable.system.state_names.index("wind_1")
     a_top = pair.adjoint_at_start[first : first + shaping_filter.order]
-    F_bottom = np.abs(shaping_filter.F[shaping_filter.altitude <= top]).sum(axis=2).max()
-    grid = _grid(shaping_filter, bottom, top, RATE / max(F_bottom, RATE / (top - bottom)))
+    fastest = np.abs(shaping_filter.F[shaping_filter.altitude <= top]).sum(axis=2).max()  # 1/m, or more
+    grid = _grid(shaping_filter, bottom, top, RATE / max(fastest, RATE / (top - bottom)))
     nodes = grid.nodes.ravel()
     F, G, _ = shaping_filter.at(nodes)
     order = shaping_filter.order

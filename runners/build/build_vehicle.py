@@ -125,7 +125,7 @@ def check_agreement(toml: Path, file: VehicleFile, construction: Construction) -
     for tank in sorted(sloshing ^ named):
         where = "sloshes in " + CONSTRUCTION_FILE if tank in sloshing else "is no sloshing tank of " + CONSTRUCTION_FILE
         refuse(f"'{tank}' {where}; {'add' if tank in sloshing else 'remove'} its [[slosh]]", "slosh")
-    aft, forward = (x - construction.gimbal_station for x in (construction.aft_end, construction.forward_end))
+    aft, forward = map(construction.forward_of_gimbal, (construction.aft_end, construction.forward_end))
     for name, sensor in file.control.load_relief.items():
         if not aft - POSITION_TOLERANCE <= sensor.position_m <= forward + POSITION_TOLERANCE:
             refuse(
