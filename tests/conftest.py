@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 from pathlib import Path
 
@@ -13,7 +14,9 @@ from ascentwind.runners import Study
 @pytest.fixture(scope="session", autouse=True)
 def cache(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
-        folder = tmp_path_factory.mktemp("cache")
+        kept = os.environ.get("ASCENTWIND_TEST_CACHE")  # keys hold the source: a library of old code is never found
+        folder = Path(kept) if kept else tmp_path_factory.mktemp("cache")
+        folder.mkdir(exist_ok=True)
         folder.chmod(0o700)
         patch.setenv("ASCENTWIND_CACHE", str(folder))
         yield folder
