@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import math
 import re
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import DataError, suggestion
+from .numbers import parse_number
 
 Order = Literal["increasing", "not decreasing", "any"]
 _HEADER = re.compile(r"^\s*(?P<name>[^\[\]]+?)\s*\[(?P<unit>[^\[\]]*)\]\s*$")
@@ -104,16 +104,14 @@ def read_csv_table(
                     raise DataError("is empty; fill the cell", file=file, column=names[j], row=line)
                 continue
             try:
-                data[i, j] = float(cell)
+                data[i, j] = parse_number(cell)
             except ValueError:
-                data[i, j] = math.nan
-            if not math.isfinite(data[i, j]):
                 raise DataError(
                     f"'{cell.strip()}' is not a finite number; fill the cell or remove the row",
                     file=file,
                     column=names[j],
                     row=line,
-                )
+                ) from None
     table = CsvTable(
         file,
         units,

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import DataError, suggestion
+from .numbers import parse_number
 from .wind_statistics import TwoComponentStatistics, WindStatistics
 
 COLUMNS = ("profile", "date", "altitude [m]", "u [m/s]", "v [m/s]")
@@ -160,17 +161,14 @@ def read_soundings(file: Path, drop_incomplete: bool = False) -> Soundings:
 
 def _number(cell: str, column: str, file: Path, line: int) -> float:
     try:
-        value = float(cell)
+        return parse_number(cell)
     except ValueError:
-        value = np.nan
-    if not np.isfinite(value):
         raise DataError(
             f"'{cell.strip()}' is not a finite number; fill it or remove the profile",
             file=file,
             column=column,
             row=line,
-        )
-    return value
+        ) from None
 
 
 def _day(cell: str, file: Path, line: int) -> float:

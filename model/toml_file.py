@@ -5,21 +5,41 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, Literal, TypeVar, get_args, get_origin
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+import numpy as np
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, ValidationInfo, field_validator
 
 from .errors import DataError, suggestion
 
+
+def _whole(value: Any) -> Any:
+    """Return 1e4 as 10000; what is no whole number stays and is refused by its type."""
+    return int(value) if isinstance(value, float) and value.is_integer() else value
+
+
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
+Whole = Annotated[int, BeforeValidator(_whole)]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
 
 
 class Section(BaseModel):
-    """A table of a TOML file: unknown keys are refused."""
+    """A table of a TOML file: unknown keys are refused, and every value must have the type of its key.
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    Neither ``true`` nor ``"0.005"`` is a number, neither 1 nor ``"yes"`` is true.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True)
+
+    @field_validator("*", mode="before")
+    @classmethod
+    def _no_truth_for_a_number(cls, value: Any, info: ValidationInfo) -> Any:
+        """Python takes True for the 1 of a choice of numbers."""
+        annotation = cls.model_fields[str(info.field_name)].annotation
+        if isinstance(value, bool) and get_origin(annotation) is Literal:
+            raise ValueError(f"should be {' or '.join(map(str, get_args(annotation)))}")
+        return value
 
 
 File = TypeVar("File", bound=Section)
@@ -60,7 +80,7 @@ def validated(data: Mapping[str, Any], model: type[File], file: Path | None = No
     DataError
     """
     try:
-        return model.model_validate(data)
+        return model.model_validate(_plain(data))
     except ValidationError as error:
         errors = error.errors()
         # a misspelt key is missing too; its spelling helps more
@@ -72,9 +92,18 @@ def validated(data: Mapping[str, Any], model: type[File], file: Path | None = No
             why = "is missing; add it"
         else:
             why = str(first["msg"]).removeprefix("Value error, ").replace("valid tuple", "valid list")
-            if not isinstance(first["input"], dict | list):
+            if not isinstance(first["input"], dict | tuple):
                 why += f" (found {first['input']!r})"
         raise DataError(why, file=file, column=".".join(location) or None) from None
+
+
+def _plain(value: Any) -> Any:
+    """Return lists as tuples and NumPy's numbers as Python's, for the strict types of a section."""
+    if isinstance(value, np.ndarray | np.generic):
+        return _plain(value.tolist())
+    if isinstance(value, Mapping):
+        return {key: _plain(item) for key, item in value.items()}
+    return tuple(_plain(item) for item in value) if isinstance(value, list | tuple) else value
 
 
 def _put(data: dict[str, Any], dotted: str, value: Any, file: Path) -> None:

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .errors import DataError
 from .wind_filter import ShapingFilter
@@ -33,16 +36,41 @@ def read_filter(file: Path) -> ShapingFilter:
         The file and what is wrong with it.
     """
     try:
-        data = json.loads(file.read_text(encoding="utf-8"))
-        if data.get("format") != FORMAT:
+        data = json.loads(file.read_text(encoding="utf-8"), object_pairs_hook=_each_once, parse_constant=_no_number)
+        if data.get("format") != FORMAT or isinstance(data["format"], bool):
             raise DataError(f"has format {data.get('format')!r}; this version reads {FORMAT}", file=file)
-        altitude, F, G, H, start, kinks = (np.array(data[k], float) for k in KEYS)
+        altitude, F, G, H, start, kinks = (_numbers(data[k], k) for k in KEYS)
         return ShapingFilter(str(data["name"]), altitude, F, G, H, start, tuple(kinks.tolist()), str(data["source"]))
     except OSError as error:
         raise DataError(f"cannot be read ({error.strerror or error})", file=file) from None
     except KeyError as error:
         raise DataError(f"lacks {error}; write filters with 'ascentwind wind fit'", file=file) from None
-    except (ValueError, TypeError, AttributeError, IndexError) as error:
+    except (ValueError, TypeError, AttributeError, IndexError, OverflowError) as error:
         raise DataError(f"is not a wind filter: {error}", file=file) from None
     except DataError as error:
         raise DataError(error.why, file=file) from None
+
+
+def _each_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Return an object of the file; what stands twice is refused, for JSON would take the last."""
+    keys = [key for key, _ in pairs]
+    for key in keys:
+        if keys.count(key) > 1:
+            raise ValueError(f"'{key}' stands twice; keep one")
+    return dict(pairs)
+
+
+def _no_number(word: str) -> float:
+    raise ValueError(f"{word} is not a finite number")
+
+
+def _numbers(value: Any, key: str) -> NDArray[np.float64]:
+    """Return an array of a file; NumPy would take true and "1" for numbers."""
+    items = [value]
+    while items:
+        item = items.pop()
+        if isinstance(item, list):
+            items += item
+        elif isinstance(item, bool) or not isinstance(item, int | float) or not math.isfinite(item):
+            raise ValueError(f"'{key}' holds {json.dumps(item)[:40]}, which is not a finite number")
+    return np.array(value, float)

@@ -35,9 +35,12 @@ def parse_changes(texts: Sequence[str]) -> dict[str, Any]:
         if not equals or not key.strip():
             raise DataError(f"'{text}' changes nothing; write KEY=VALUE, such as options.full_coupling=true")
         try:
-            changes[key.strip()] = tomllib.loads(f"value = {value}")["value"]
+            read = tomllib.loads(f"value = {value}")
         except tomllib.TOMLDecodeError:
             raise DataError(f"'{value}' is not a TOML value; text needs quotes, true and numbers none") from None
+        if list(read) != ["value"]:
+            raise DataError(f"'{value}' is more than one TOML value; write one --set for each key")
+        changes[key.strip()] = read["value"]
     return changes
 
 

@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from ..model.errors import TimeRangeError
+from ..model.numbers import parse_number
 from ..model.vehicle import Vehicle
 
 MOST = 100_000
@@ -24,8 +25,8 @@ def parse_times(text: str) -> list[float]:
     form = "write START:STOP:STEP or T1,T2,... in seconds, such as 40:100:5"
     try:
         if ":" not in text:
-            return [float(part) for part in text.split(",")]
-        start, stop, step = (float(part) for part in text.split(":"))
+            return [parse_number(part) for part in text.split(",")]
+        start, stop, step = (parse_number(part) for part in text.split(":"))
     except ValueError:
         raise TimeRangeError(f"'{text}' does not name times; {form}") from None
     if not all(np.isfinite((start, stop, step))) or step <= 0 or stop < start:
@@ -84,6 +85,6 @@ def parse_time_or_peak(text: str) -> float | Literal["peak"]:
     if text == "peak":
         return "peak"
     try:
-        return float(text)
+        return parse_number(text)
     except ValueError:
         raise TimeRangeError(f"'{text}' is not a time; give seconds or 'peak'") from None

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from ..toml_file import Name, NotNegative, Positive, Section
+from ..toml_file import Name, NotNegative, Positive, Section, Whole
 
 Status = Literal["found", "computed", "assumed", "memory"]
 
@@ -26,7 +26,7 @@ class TankSectionEntry(Section):
     center_m: float | None = None
     semi_axis_m: Positive | None = None
     sign: Literal[1, -1] = 1
-    count: Annotated[int, Field(ge=1)] = 1
+    count: Annotated[Whole, Field(ge=1)] = 1
 
     @model_validator(mode="after")
     def _keys_of_kind(self):
@@ -50,7 +50,7 @@ class TankEntry(Section):
 
 class EngineEntry(Section):
     name: Name
-    count: Annotated[int, Field(ge=1)]
+    count: Annotated[Whole, Field(ge=1)]
     gimballed: bool
     exit_area_m2: NotNegative
     file: str
@@ -113,7 +113,7 @@ class ConstructionFile(Section):
     aft_end_m: float
     forward_end_m: float
     reference_area_m2: Positive
-    bending_modes: Annotated[int, Field(ge=0)]
+    bending_modes: Annotated[Whole, Field(ge=0)]
     slosh_method: Literal["surface_radius", "cylinder", "potential"]
     load_stations_m: tuple[float, ...] = ()
     end_time_s: Positive

@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from ...model.errors import DataError, TimeRangeError
-from ...model.toml_file import Section, read_toml, validated
+from ...model.toml_file import Section, Whole, read_toml, validated
 from ..sweep_engine import LARGEST_TOLERANCE, LEAST_TOLERANCE
 from ..times import parse_times
 
@@ -45,7 +45,7 @@ class GridQuantity(PlannedQuantity):
     """``values``, or ``linspace = [first, last, count]``."""
 
     values: tuple[Finite, ...] = ()
-    linspace: tuple[Finite, Finite, Annotated[int, Field(ge=2, le=MOST)]] | None = None
+    linspace: tuple[Finite, Finite, Annotated[Whole, Field(ge=2, le=MOST)]] | None = None
 
     @model_validator(mode="after")
     def _one_list(self) -> Self:
@@ -139,8 +139,8 @@ class OneAtATime(Section):
 class Dispersion(Section):
     """Random members."""
 
-    members: Annotated[int, Field(ge=2, le=MOST)]
-    seed: Annotated[int, Field(ge=0)]
+    members: Annotated[Whole, Field(ge=2, le=MOST)]
+    seed: Annotated[Whole, Field(ge=0)]
     sampling: Literal["random", "latin_hypercube", "sobol"] = "latin_hypercube"
     quantity: Annotated[tuple[DispersedQuantity, ...], Field(min_length=1)]
     correlation: tuple[Correlation, ...] = ()
