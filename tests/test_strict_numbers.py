@@ -21,21 +21,8 @@ from hypothesis import strategies as st
 
 AS504 = built_in_vehicles()["as504"]
 NO_NUMBERS = [
-    "true",
-    "yes",
-    "1_000",
-    "１２",
-    "٣",
-    "nan",
-    "inf",
-    "-Infinity",
-    "1e999",
-    "0x10",
-    "1,5",
-    "1 2",
-    "",
-    "1e",
-    "--1",
+    *("true", "yes", "1_000", "\uff11\uff12", "\u0663", "nan", "inf", "-Infinity", "1e999"),
+    *("0x10", "1,5", "1 2", "", "1e", "--1"),
 ]
 
 
@@ -108,10 +95,15 @@ def test_one_change_holds_one_value():
 
 @pytest.mark.parametrize(
     ("old", "new"),
-    [('"format": 1', '"format": true'), (r'("altitude_m": \[)[^,]*', r'\1true'), (r'("altitude_m": \[)[^,]*', r'\1"3"'),
-     (r'("altitude_m": \[)[^,]*', r'\1NaN'), (r'("altitude_m": \[)[^,]*', r'\g<1>1e999'), (r'("altitude_m": \[)[^,]*', r'\1null'),
-     (r'("altitude_m": \[)[^,]*', r"\g<1>1" + "0" * 400), ('"format": 1', '"format": 1, "name": "twice"')],
-)  # fmt: skip
+    [
+        ('"format": 1', '"format": true'),
+        ('"format": 1', '"format": 1, "name": "twice"'),
+        *(
+            (r'("altitude_m": \[)[^,]*', rf"\g<1>{word}")
+            for word in ("true", '"3"', "NaN", "1e999", "null", "1" + "0" * 400)
+        ),
+    ],
+)
 def test_numbers_of_a_filter(tmp_path, old, new):
     text = (AS504 / "wind_march_zonal_filter.json").read_text()
     changed = re.sub(old, new, text, count=1)
@@ -152,7 +144,7 @@ def test_values_of_a_design():
         validated({"format": 1, "times": "40:50:5", "parameters": {"gain": [0.0, "1"]}}, DesignEntry)
 
 
-@pytest.mark.parametrize("text", ["1_0:20:5", "１0", "nan", "40,inf", "1e999"])
+@pytest.mark.parametrize("text", ["1_0:20:5", "\uff110", "nan", "40,inf", "1e999"])
 def test_times(text):
     with pytest.raises(TimeRangeError):
         parse_times(text)
