@@ -16,6 +16,7 @@ import casadi as ca
 import numpy as np
 
 from .errors import DirectNoiseError, NonlinearSystemError, TimeRangeError, UnknownNameError
+from .switches import switch_times
 from .tables import TableGroup
 
 
@@ -78,7 +79,7 @@ class LinearSystem:
     start_covariance : mapping of source to (n, n) SX or array
         Covariance P0 of the states at the start that a source brings; a function of p. Missing means zero.
     discontinuities : tuple of float
-        Times at which a table jumps; integrators stop there.
+        Times at which a table or a matrix jumps, s; integrators stop there. They are put in order, each once.
     start, end : float
         Times between which the system is defined, s.
     coupling_matrix : SX, optional
@@ -129,6 +130,7 @@ class LinearSystem:
                 raise NonlinearSystemError(f"system '{self.name}': {what} disagree in number: {counts}")
         if not self.end > self.start:
             raise TimeRangeError(f"system '{self.name}' ends at {self.end:g} s, before its start at {self.start:g} s")
+        object.__setattr__(self, "discontinuities", switch_times(self.discontinuities, self.start))
         for label, names in (
             ("state", self.state_names),
             ("noise", self.noise_names),
@@ -296,6 +298,7 @@ def define_system(
     start, end : float
         Seconds.
     discontinuities : sequence of float
+        Times at which the equations jump, s, in any order.
 
     Returns
     -------

@@ -14,6 +14,7 @@ from .errors import DataError, suggestion
 from .load_relief import SCHEDULE_COLUMNS, mode_columns
 from .loads import REACTION_COLUMNS, load_columns
 from .local_aerodynamics import PREFIX, local_columns, local_load_columns
+from .switches import switch_times
 from .tables import Table
 from .vehicle_file import (
     BendingEntry,
@@ -194,7 +195,7 @@ def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehi
         wind=wind,
         start=start,
         end=last.last,
-        discontinuities=tuple(sorted(t for t in reader.discontinuities if start < t < last.last)),
+        discontinuities=switch_times((t for t in reader.discontinuities if start < t < last.last), start),
         sources=tuple(reader.sources),
     )
 

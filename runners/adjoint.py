@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from ..codegen.compiled import ExecutableSystem
 from ..codegen.functions import state_scales
-from .integration import Counters, Integrator, IntegratorOptions, intervals
+from .integration import Counters, Integrator, IntegratorOptions
+from .time_nodes import interval_before, intervals, time_nodes
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +75,7 @@ class AdjointSolver:
 
     def _terminal(self, time: float) -> tuple[NDArray, NDArray, NDArray]:
         """Return scaled adjoints at t2, G and the known inputs there."""
-        last = intervals(self._executable.system, self._executable.system.start, time)[-1]
+        last = interval_before(self._executable.system, time)
         matrices = self._executable.matrices(time, last.low, last.high)
         scaled = self._state_scale[:, None] * matrices["C"].T / self._output_scale
         return scaled, matrices["G"], matrices["inputs"][:, 0]
@@ -86,9 +87,10 @@ class AdjointSolver:
         ------
         IntegrationError
         """
-        s = len(self._executable.system.sources)
-        scaled, G, inputs = self._terminal(time)
-        scaled, quadratures, counters = self._backward(scaled, time, self._executable.system.start)
+        s, system = len(self._executable.system.sources), self._executable.system
+        node = float(time_nodes(system, [time])[0])
+        scaled, G, inputs = self._terminal(node)
+        scaled, quadratures, counters = self._backward(scaled, node, system.start)
         adjoint = scaled / self._state_scale[:, None] * self._output_scale
         variance = quadratures[:, :s] * self._output_scale[:, None] ** 2
         for k, covariance in enumerate(self._start_covariance):
@@ -119,6 +121,7 @@ class AdjointSolver:
     def history(self, time: float, spacing: float) -> AdjointHistory:
         """Return adjoint and weighting functions at points at most ``spacing`` seconds apart."""
         system = self._executable.system
+        (time,) = time_nodes(system, [time]).tolist()
         scaled, G, _ = self._terminal(time)
         times, adjoints, noise, inputs = [], [], [], []  # latest first
         for interval in reversed(intervals(system, system.start, time)):

@@ -86,7 +86,7 @@ def along_csv(found: xr.Dataset) -> str:
         for n, station in enumerate(found["station"].values):
             for s, source in enumerate(found["source"].values):
                 row = (np.format_float_scientific(values[k, n, s], 9) for values in numbers)
-                writer.writerow([f"{time:g}", f"{station:.9g}", source, *row])
+                writer.writerow([f"{time:.12g}", f"{station:.9g}", source, *row])
     return buffer.getvalue()
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..model.system import LinearSystem
 from ..model.tables import TableGroup
+from .time_nodes import intervals, time_nodes
 
 STEP = 0.04  # s, the longest
 PHASE = 0.8  # rad, the longest step of the fastest lightly damped root: its error is then 5e-9 rad
@@ -59,8 +60,9 @@ def collocation_grid(
     Steps end on discontinuities and table knots and are short beside the former and the end times. Tables are cubic
     between knots and less smooth across them; a step that held a knot would lose its order.
     """
-    begin, end = system.start, max(times)
-    ends = sorted({begin, *(d for d in system.discontinuities if begin < d < end), *times})
+    nodes = time_nodes(system, np.sort(times))
+    begin, end = system.start, float(nodes[-1])
+    ends = sorted({begin, *(i.end for i in intervals(system, begin, end)), *nodes.tolist()})
     edges = [np.array([begin])]
     knots = _knot_times(groups, begin, end, step)
     for low, high in pairwise(ends):

@@ -17,7 +17,7 @@ from ..codegen.compiled import ExecutableSystem
 from ..codegen.evaluation import MatrixEvaluator
 from ..codegen.functions import state_scales
 from ..model.errors import IntegrationError
-from .integration import intervals
+from .time_nodes import interval_before, intervals, time_nodes
 
 
 @dataclass(frozen=True)
@@ -92,8 +92,8 @@ def covariance_equation(
     y = np.concatenate([np.array(start).ravel(), np.zeros(n)])
     covariances, means = [], []
     begin = system.start
-    for time in times:
-        for interval in intervals(system, begin, float(time)) if time > begin else []:
+    for time, node in zip(times, time_nodes(system, times).tolist(), strict=True):
+        for interval in intervals(system, begin, node) if node > begin else []:
 
             def rate(t: float, y: NDArray, low: float = interval.low, high: float = interval.high) -> NDArray:
                 A, B, E, inputs = matrices(t, low, high)
@@ -113,12 +113,11 @@ def covariance_equation(
                     f"{solution.message}"
                 )
             y = solution.y[:, -1]
-        begin = float(time)
-        last = intervals(system, system.start, begin)[-1]
+        begin, last = node, interval_before(system, node)
         C, G, inputs = outputs(begin, last.low, last.high)
         C = C * scale
         covariances.append(C @ y[:-n].reshape(len(sources), n, n) @ C.T)
         means.append(C @ y[-n:] + G @ inputs[:, 0])
         if progress:
-            progress(begin)
+            progress(float(time))
     return CovarianceResult(np.asarray(times, float), np.array(covariances), np.array(means))

@@ -23,7 +23,7 @@ from ..codegen.ensemble import Steps
 from ..codegen.evaluation import MatrixEvaluator
 from ..codegen.functions import state_scales
 from ..model.errors import IntegrationError
-from .integration import Interval, intervals
+from .time_nodes import Interval, interval_before, intervals, time_nodes
 
 LARGEST_NORM = 1.0  # of an exponent whose series is summed; with TERMS terms it leaves 1e-13
 TERMS = 15
@@ -84,9 +84,10 @@ def discretise(executable: ExecutableSystem, times: Sequence[float], substep: fl
     rates = MatrixEvaluator(executable, ("A", "B", "E", "inputs"))
     outputs = MatrixEvaluator(executable, ("C", "G", "inputs"))
     columns = [system.noise_columns(source) for source in system.sources]
+    nodes = time_nodes(system, times).tolist()
     pieces = [
         (number, interval)
-        for number, (begin, end) in enumerate(pairwise([system.start, *map(float, times)]))
+        for number, (begin, end) in enumerate(pairwise([system.start, *nodes]))
         for interval in (intervals(system, begin, end) if end > begin else [])
     ]
     substeps = _substeps(rates, [interval for _, interval in pieces], scale, columns, substep)
@@ -97,15 +98,15 @@ def discretise(executable: ExecutableSystem, times: Sequence[float], substep: fl
             before = transition[number], added[number], forced[number]
             transition[number], added[number], forced[number] = _compose(before, part)
     C, mean, state = [], [], np.zeros(n)
-    for time, Phi, Q, b in zip(times, transition, added, forced, strict=True):
+    for time, Phi, Q, b in zip(nodes, transition, added, forced, strict=True):
         if not (np.isfinite(Phi).all() and np.isfinite(Q).all()):
             raise IntegrationError(
                 f"the transition before {time:g} s left the range of numbers; the system grows without "
                 "bound there or a table holds an impossible value (see 'ascentwind inspect')"
             )
         state = Phi @ state + b
-        last = intervals(system, system.start, float(time))[-1]
-        y, G, inputs = outputs(float(time), last.low, last.high)
+        last = interval_before(system, time)
+        y, G, inputs = outputs(time, last.low, last.high)
         C.append(y * scale)
         mean.append(C[-1] @ state + G @ inputs[:, 0])
     start = [system.start_covariance_matrix(name, executable.parameters) for name in system.sources]

@@ -15,6 +15,7 @@ from .ensemble import EnsembleOptions, ensemble_dataset
 from .integration import IntegratorOptions
 from .statistics import COMBINED, ResponseStatistics, provenance, response_dataset, statistics_dataset
 from .sweep_engine import SweepOptions, SweepResult, sweep, sweep_of
+from .time_nodes import time_nodes
 
 if TYPE_CHECKING:
     from .study import Study
@@ -133,8 +134,8 @@ def _cvodes(
 ) -> ResponseStatistics:
     solver = AdjointSolver(study.with_means, options)
     runs = []
-    for time in times:
-        runs.append(solver.run(time))
+    for time, node in zip(times, time_nodes(study.system, times).tolist(), strict=True):
+        runs.append(replace(solver.run(node), time=time))
         if progress:
             progress(time)
     return response_dataset(study, runs, responses, options)

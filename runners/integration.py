@@ -1,9 +1,8 @@
-"""CVODES through CasADi: options, intervals between discontinuities, counters, and errors with a time in them."""
+"""CVODES through CasADi: options, counters, and errors with a time in them."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from itertools import pairwise
 from typing import Any, Literal
 
 import casadi as ca
@@ -11,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..model.errors import IntegrationError
-from ..model.system import LinearSystem
 
 Method = Literal["adams", "bdf"]
 Iteration = Literal["newton", "functional"]
@@ -61,28 +59,6 @@ class IntegratorOptions:
             "quad_err_con": True,
             "show_eval_warnings": False,
         }
-
-
-@dataclass(frozen=True)
-class Interval:
-    """Flight times between two discontinuities, and the table limits that keep each side to itself."""
-
-    begin: float
-    end: float
-    low: float
-    high: float
-
-
-def intervals(system: LinearSystem, begin: float, end: float) -> list[Interval]:
-    """Split [begin, end] at the system's discontinuities, in order of time.
-
-    Just before a discontinuity tables are looked up at the next smaller number, at it from its right side; an end
-    that falls on a discontinuity is taken from the left.
-    """
-    inner = [d for d in system.discontinuities if begin < d < end]
-    edges = [begin, *inner, end]
-    jumps = set(system.discontinuities)
-    return [Interval(a, b, a, float(np.nextafter(b, -np.inf)) if b in jumps else b) for a, b in pairwise(edges)]
 
 
 @dataclass

@@ -15,7 +15,8 @@ from ..codegen.compiled import ExecutableSystem
 from ..codegen.functions import state_scales
 from ..model.assemble import MEAN_TABLES
 from ..model.tables import TableGroup
-from .integration import Integrator, IntegratorOptions, intervals
+from .integration import Integrator, IntegratorOptions
+from .time_nodes import intervals
 
 TOLERANCE = 1e-9
 

@@ -19,6 +19,7 @@ from ..model.load_components import component_columns
 from ..model.local_aerodynamics import local_load_columns
 from ..model.station_loads import StationLoads, load_station_loads
 from .statistics import COMBINED, provenance
+from .time_nodes import interval_before, time_nodes
 
 if TYPE_CHECKING:
     from .study import Study
@@ -106,7 +107,7 @@ def station_rows(
     """Return K, the coefficient of each component at each station, (times, stations, components)."""
     assert study.vehicle is not None
     tanks = [tank.name for tank in study.vehicle.slosh]
-    times = np.where(np.isin(times, study.system.discontinuities), np.nextafter(times, -np.inf), times)  # left of jumps
+    times = np.array([interval_before(study.system, node).high for node in time_nodes(study.system, times)])
     columns = loads.at(times)
     zero = np.zeros((times.size, loads.station.size))
     columns |= {f"slosh_displacement_{tank}": zero for tank in tanks}

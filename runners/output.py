@@ -95,5 +95,5 @@ def statistics_csv(statistics: ResponseStatistics) -> str:
         for r, response in enumerate(statistics["response"].values):
             for s, source in enumerate(statistics["source"].values):
                 numbers = (np.format_float_scientific(values[name][k, r, s], 9) for name in COLUMNS[4:])
-                writer.writerow([f"{time:g}", response, statistics["unit"].values[r], source, *numbers])
+                writer.writerow([f"{time:.12g}", response, statistics["unit"].values[r], source, *numbers])
     return buffer.getvalue()

@@ -14,8 +14,9 @@ from ..model.assemble import MEAN_TABLES, mean_knots
 from ..model.construction.planar_equations import PlanarLoop, planar_loop
 from ..model.errors import DataError
 from ..model.vehicle import Vehicle
-from .integration import Integrator, IntegratorOptions, intervals
+from .integration import Integrator, IntegratorOptions
 from .mean_response import mean_splines
+from .time_nodes import intervals
 
 TOLERANCE = 1e-9
 LARGEST_ANGLE = np.deg2rad(45.0)  # beyond, a constant normal-force slope means nothing

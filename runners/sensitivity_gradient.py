@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from ..model.assemble import MEAN_TABLES
 from .collocation_grid import STAGES, tables_at
 from .flight_nodes import FlightNodes
-from .integration import intervals
 from .start_covariance import start_functions
+from .time_nodes import interval_after, interval_before
 
 SLOPE_STEP = 1e-3  # s, of central differences of the output matrices, which are cubic in time
 
@@ -91,7 +91,7 @@ class AdjointPair:
     response : int
         Row of C.
     time : float
-        t2, s, an edge of the grid; on a discontinuity it is seen from the left.
+        t2, s, one of those that the grid was made for; on a discontinuity it is seen from the left.
     sources : tuple of str
     """
 
@@ -99,16 +99,16 @@ class AdjointPair:
         self.flight, self.executable = flight, flight.executable
         system, executable = self.executable.system, self.executable
         self.response, self.time, self.sources = response, time, sources
-        n, steps = len(system.states), int(np.searchsorted(flight.grid.edges, time))
-        self.steps = steps
+        n, steps = len(system.states), int(np.argmin(np.abs(flight.grid.edges - time)))
+        self.steps, self.node = steps, float(flight.grid.edges[steps])
         self.mask = np.array([float(noise.source in sources) for noise in system.noises])
-        last = intervals(system, system.start, time)[-1]
+        last = interval_before(system, self.node)
         self._low, self.end = last.low, last.high  # the end from the left, where it is a discontinuity
         self.times, self.weights = flight.grid.nodes[:steps].ravel(), flight.grid.weights[:steps].ravel()
         self.tables = flight.tables[: STAGES * steps]
         self.tables_at_end = tables_at(executable.groups, np.array([self.end]))[0]
         self.matrices = {name: matrix.first(STAGES * steps) for name, matrix in flight.matrices.items()}
-        self.at_end = executable.matrices(time, last.low, last.high)
+        self.at_end = executable.matrices(self.node, last.low, last.high)
 
         still = np.zeros((steps, STAGES, n))
         stages, edges = flight.solver.backward(self.at_end["C"][response], still)
@@ -129,13 +129,11 @@ class AdjointPair:
     def slopes(self) -> tuple[float, float]:
         """Derivatives of variance and mean with respect to t2, between discontinuities."""
         low, high = self._low, self.end
-        if high < self.time:  # on a discontinuity: its left side
-            before, after = self.time - 2 * SLOPE_STEP, self.time
+        if high < self.node:  # on a discontinuity: its left side
+            before, after = max(high - 2 * SLOPE_STEP, low), high
         else:
-            jumps = [*self.executable.system.discontinuities, self.executable.system.end]
-            before, after = self.time - SLOPE_STEP, self.time + SLOPE_STEP
-            high = min([np.nextafter(j, -np.inf) for j in jumps if j > self.time], default=np.inf)
-            after, before = min(after, high), max(before, low)
+            high = interval_after(self.executable.system, self.node).high
+            before, after = max(self.node - SLOPE_STEP, low), min(self.node + SLOPE_STEP, high)
         first, second = (self.executable.matrices(t, low, high) for t in (before, after))
         i, m, span = self.response, self.at_end, after - before
         C, u = m["C"][i], m["inputs"][:, 0]

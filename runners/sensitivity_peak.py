@@ -13,6 +13,7 @@ import numpy as np
 from scipy.optimize import root_scalar
 
 from ..model.errors import TimeRangeError
+from .time_nodes import beyond
 from .times import parse_times
 
 if TYPE_CHECKING:
@@ -49,7 +50,7 @@ def peak_time(study: Study, request: Request) -> tuple[float, bool]:
     candidates = [times[best]]
     edges = [low, *(d for d in study.system.discontinuities if low < d < high), high]
     for a, b in pairwise(edges):
-        a = float(np.nextafter(a, np.inf)) if a in study.system.discontinuities else a
+        a = beyond(study.system, a) if a in study.system.discontinuities else a
         candidates += [t for t in (a, b) if t in edges[1:-1]]
         if quantity(a)[1] > 0 > quantity(b)[1]:
             candidates.append(float(root_scalar(lambda t: quantity(t)[1], bracket=(a, b), xtol=TIME_TOLERANCE).root))

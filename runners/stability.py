@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..codegen.compiled import ExecutableSystem
 from ..model.errors import DataError, SingularCouplingError, UnstableSystemWarning
 from ..model.tables import table_values
-from .integration import intervals
+from .time_nodes import interval_after, intervals
 
 UNSTABLE = 1e-6  # rad/s; a real part below is rounding or an integrator
 
@@ -30,11 +30,8 @@ class Root:
 def matrices_at(executable: ExecutableSystem, time: float) -> dict[str, NDArray[np.float64]]:
     """Return A, B, C, D, E, G and the known inputs at a time; at a discontinuity those after it."""
     system = executable.system
-    later = [d for d in system.discontinuities if d > time]
-    earlier = [d for d in system.discontinuities if d <= time]
-    low = max([system.start, *earlier])
-    high = float(np.nextafter(later[0], -np.inf)) if later else system.end
-    matrices = executable.matrices(time, low, high)
+    here = interval_after(system, time)
+    matrices = executable.matrices(time, here.low, here.high)
     for name, matrix in matrices.items():
         if not np.isfinite(matrix).all():
             raise DataError(_not_finite(executable, name, matrix), time=time)

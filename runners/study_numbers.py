@@ -24,6 +24,7 @@ from .mean_response import with_mean_tables
 from .planar_mean import with_nonlinear_mean
 from .stability import Root, check_coupling, matrices_at, roots
 from .sweep_engine import sweep_of, with_sweep_mean_tables
+from .time_nodes import on_flight
 from .wind_range import warn_beyond
 from .wind_start import covariance_at
 
@@ -185,13 +186,14 @@ class StudyNumbers:
         for time in times:
             if not np.isfinite(time):
                 raise TimeRangeError(f"{time} is not a time")
+            if on_flight(self.system, [time])[0]:
+                continue
             if time < self.system.start:
                 raise TimeRangeError(
                     f"end time {time:g} s lies before the start at {self.system.start:g} s; "
                     "choose a later one or an earlier start_time_s"
                 )
-            if time > self.system.end:
-                raise TimeRangeError(f"end time {time:g} s lies beyond {self._end_of_data()}")
+            raise TimeRangeError(f"end time {time:g} s lies beyond {self._end_of_data()}")
 
     def _end_of_data(self) -> str:
         end = f"the end of the system at {self.system.end:g} s"

@@ -16,8 +16,8 @@ from ..codegen.sweep import CompiledSweep, Segments, compiled_sweep
 from ..model.errors import AscentwindError, IntegrationError, TimeRangeError
 from ..model.system import LinearSystem
 from .cores import available_cores
-from .integration import intervals
 from .mean_response import MeanResponse, with_mean_tables
+from .time_nodes import intervals, on_flight, time_nodes
 
 LONGEST_SEGMENT = 1.0  # s; weights of the error control are renewed and the Gramians stay well scaled
 LEAST_TOLERANCE, LARGEST_TOLERANCE = 1e-12, 1e-2
@@ -157,15 +157,16 @@ def sweep(
     SweepOptions(relative_tolerance)
     system.refuse_direct_noise(system.output_names if responses is None else responses)
     longest = LONGEST_SEGMENT if weighting_spacing is None else min(LONGEST_SEGMENT, weighting_spacing)
+    nodes = time_nodes(system, ends)
     # an end time at the start needs no integration, only a segment to read it in
-    last = ends[-1] if ends[-1] > system.start else min(system.end, system.start + longest)
-    segments = flight_segments(system, (*ends[:-1].tolist(), float(last)), longest)
+    last = nodes[-1] if nodes[-1] > system.start else min(system.end, system.start + longest)
+    segments = flight_segments(system, (*np.unique(nodes[nodes < last]).tolist(), float(last)), longest)
     result = engine.run(executable, segments, relative_tolerance, transition=weighting_spacing is not None)
-    at = np.where(ends > system.start, np.searchsorted(segments.end, ends), -1)
+    at = np.where(nodes > system.start, np.searchsorted(segments.end, nodes), -1)
     found = result.covariance[at], result.mean[at], result.error[at]
     if at[0] < 0:
         for array, value in zip(found, _at_start(executable, segments), strict=True):
-            array[0] = value
+            array[at < 0] = value
     weighting = None
     if result.transition is not None:
         weighting = _weighting_functions(executable, segments, at, result.transition)
@@ -261,7 +262,7 @@ def check_times(system: LinearSystem, times: ArrayLike) -> NDArray[np.float64]:
     ends = np.atleast_1d(np.asarray(times, dtype=float))
     if ends.ndim != 1 or ends.size == 0:
         raise TimeRangeError("the sweep needs at least one end time")
-    inside = (ends >= system.start) & (ends <= system.end)
+    inside = on_flight(system, ends)
     if not inside.all():
         raise TimeRangeError(
             f"end time {ends[np.argmin(inside)]:g} s is off the flight of '{system.name}'; choose times from "
@@ -301,7 +302,7 @@ def _weighting_functions(
     noise = np.zeros((k, m, r, len(system.noises)))
     inputs = np.zeros((k, m, r, len(system.input_names)))
     rows = np.zeros((k, r, n))
-    joins = {int(segment): end for end, segment in enumerate(at)}
+    joins = {int(segment): int(np.argmax(at == segment)) for segment in at}  # the first of the ends of a segment
     first = k
     for point in range(m - 1, -1, -1):
         segment = max(point - 1, 0)  # a point belongs to the segment that it ends: the left side of a jump
@@ -309,8 +310,8 @@ def _weighting_functions(
         if point < m - 1:
             rows[first:] = rows[first:] @ transition[point]
         if point - 1 in joins:
+            rows[joins[point - 1] : first] = matrices["C"]
             first = joins[point - 1]
-            rows[first] = matrices["C"]
         noise[first:, point] = rows[first:] @ matrices["B"]
         inputs[first:, point] = rows[first:] @ matrices["E"]
     return WeightingFunctions(times, noise, inputs)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from decimal import Decimal
 from typing import Literal
 
 import numpy as np
@@ -15,7 +16,7 @@ MOST = 100_000
 
 
 def parse_times(text: str) -> list[float]:
-    """Return the times that a text names, the stop included.
+    """Return the times that a text names, the stop included; those of a grid are the decimals that a person would type.
 
     Raises
     ------
@@ -26,7 +27,8 @@ def parse_times(text: str) -> list[float]:
     try:
         if ":" not in text:
             return [parse_number(part) for part in text.split(",")]
-        start, stop, step = (parse_number(part) for part in text.split(":"))
+        parts = text.split(":")
+        start, stop, step = (parse_number(part) for part in parts)
     except ValueError:
         raise TimeRangeError(f"'{text}' does not name times; {form}") from None
     if not all(np.isfinite((start, stop, step))) or step <= 0 or stop < start:
@@ -35,7 +37,8 @@ def parse_times(text: str) -> list[float]:
         )
     if (stop - start) / step > MOST:
         raise TimeRangeError(f"'{text}' names more than {MOST} times; take a larger step")
-    return [float(t) for t in start + step * np.arange(int(np.floor((stop - start) / step + 1e-9)) + 1)]
+    first, last, by = (Decimal(part.strip()) for part in parts)
+    return [float(first + k * by) for k in range(int((last - first) / by) + 1)]
 
 
 def end_times(times: Iterable[float]) -> list[float]:
