@@ -18,6 +18,7 @@ import platformdirs
 from filelock import FileLock, Timeout
 
 from ..model.errors import AscentwindError, AscentwindWarning
+from ..model.names import file_name
 from .compiler import Compiler, processor
 
 log = logging.getLogger(__name__)
@@ -88,7 +89,7 @@ def compiled_library(
     Parameters
     ----------
     name : str
-        Of the system; starts the file name.
+        Of the system; a file name made of it starts those of the library.
     fingerprint : str
         Hash of what the source is written from.
     source : callable
@@ -101,7 +102,7 @@ def compiled_library(
     ------
     CacheError, CompilerError
     """
-    folder = cache_folder()
+    folder, name = cache_folder(), file_name(name)
     key = content_key(fingerprint, compiler)
     path = folder / f"{name}-{key}.so"
     if _intact(path):
@@ -133,7 +134,7 @@ def set_aside(library: CompiledLibrary) -> None:
 def _install(folder: Path, path: Path, source: str, compiler: Compiler) -> None:
     with tempfile.TemporaryDirectory(dir=folder) as work:
         c_file, library = Path(work) / "system.c", Path(work) / "system.so"
-        c_file.write_text(source)
+        c_file.write_text(source, encoding="utf-8")
         compiler.compile(c_file, library)
         digest = Path(work) / "digest"
         digest.write_text(hashlib.sha256(library.read_bytes()).hexdigest())
@@ -155,7 +156,7 @@ def _intact(path: Path) -> bool:
 
 def _report_change(record: Path, structure: dict[str, str], name: str) -> None:
     try:
-        before = json.loads(record.read_text())
+        before = json.loads(record.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         before = None
     if before is None:
@@ -165,7 +166,7 @@ def _report_change(record: Path, structure: dict[str, str], name: str) -> None:
     else:
         log.info("%s: compiling again because the compiler, processor, CasADi or ascentwind changed", name)
     temporary = record.with_suffix(f".{os.getpid()}")
-    temporary.write_text(json.dumps(structure))
+    temporary.write_text(json.dumps(structure), encoding="utf-8")
     temporary.replace(record)
 
 

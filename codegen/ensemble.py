@@ -7,7 +7,6 @@ import hashlib
 from dataclasses import dataclass
 from functools import cached_property
 
-import jinja2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,12 +14,11 @@ from ..model.errors import AscentwindError
 from ..model.system import LinearSystem
 from .cache import CompiledLibrary, compiled_library
 from .compiler import find_compiler
+from .expressions import template_environment
 
 LANES = 32  # runs side by side in the vector registers
 _TEMPLATE = "ensemble.c.jinja"
-_ENVIRONMENT = jinja2.Environment(
-    loader=jinja2.PackageLoader("ascentwind.codegen"), undefined=jinja2.StrictUndefined, keep_trailing_newline=True
-)
+_ENVIRONMENT = template_environment()
 
 
 class EnsembleNeedsCompilerError(AscentwindError):

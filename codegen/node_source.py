@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import casadi as ca
-import jinja2
 
 from ..model.system import LinearSystem
-from .expressions import c_statements, enumerators
+from .expressions import c_statements, enumerators, template_environment
 
 LANES = 8  # points side by side: one 512-bit register, two of 256 bits
 ARGUMENTS = {
@@ -15,13 +14,7 @@ ARGUMENTS = {
     "linear_gradient": ("t", "v", "z", "a", "x", "c"),
 }
 SOURCE_FILES = ("node_source.py", "expressions.py", "templates/node_functions.c.jinja", "templates/collocation.c")
-_ENVIRONMENT = jinja2.Environment(
-    loader=jinja2.PackageLoader("ascentwind.codegen"),
-    undefined=jinja2.StrictUndefined,
-    keep_trailing_newline=True,
-    trim_blocks=True,
-    lstrip_blocks=True,
-)
+_ENVIRONMENT = template_environment(trim_blocks=True, lstrip_blocks=True)
 
 
 def nodes_source(system: LinearSystem, functions: tuple[ca.Function, ...]) -> str:

@@ -6,17 +6,14 @@ from dataclasses import fields
 from typing import Any
 
 import casadi as ca
-import jinja2
 import numpy as np
 
 from ..model.system import LinearSystem
-from .expressions import c_function, enumerators
+from .expressions import c_function, enumerators, template_environment
 from .fingerprint import fingerprint
 from .functions import INPUTS, INTERVAL, MATRICES, OUTPUTS, CoreFunctions, state_scales
 
-_ENVIRONMENT = jinja2.Environment(
-    loader=jinja2.PackageLoader("ascentwind.codegen"), undefined=jinja2.StrictUndefined, keep_trailing_newline=True
-)
+_ENVIRONMENT = template_environment()
 
 
 class _Patterns:

@@ -5,22 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import casadi as ca
-import jinja2
 
 from ..model.system import LinearSystem
-from .expressions import c_function, c_statements, enumerators
+from .expressions import c_function, c_statements, enumerators, template_environment
 from .fingerprint import fingerprint
 from .runge_kutta import DOP853, RungeKutta
 
 LANES = 8  # columns side by side: one 512-bit register, two of 256 bits
 
-_ENVIRONMENT = jinja2.Environment(
-    loader=jinja2.PackageLoader("ascentwind.codegen"),
-    undefined=jinja2.StrictUndefined,
-    keep_trailing_newline=True,
-    trim_blocks=True,
-    lstrip_blocks=True,
-)
+_ENVIRONMENT = template_environment(trim_blocks=True, lstrip_blocks=True)
 
 
 @dataclass(frozen=True, eq=False)

@@ -55,7 +55,11 @@ class DirectNoiseError(AscentwindError):
     """White noise reaches an output directly, so that its variance would be infinite."""
 
 
-class NonlinearSystemError(AscentwindError):
+class SystemDefinitionError(AscentwindError):
+    """A linear system of one's own is defined in a way that cannot be used."""
+
+
+class NonlinearSystemError(SystemDefinitionError):
     """An expression given for a linear system is not linear in its states and inputs."""
 
 

@@ -15,8 +15,19 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
-from .errors import DirectNoiseError, NonlinearSystemError, TimeRangeError, UnknownNameError
+from .errors import DirectNoiseError, NonlinearSystemError, SystemDefinitionError, TimeRangeError, UnknownNameError
 from .switches import switch_times
+from .system_checks import (
+    check_covariance,
+    check_keys,
+    check_labels,
+    check_symbols,
+    checked_covariance,
+    finite_number,
+    pair,
+    scalar_expression,
+    scalar_symbol,
+)
 from .tables import TableGroup
 
 
@@ -89,8 +100,13 @@ class LinearSystem:
 
     Raises
     ------
+    SystemDefinitionError
+        Names and units that are empty or hold control characters, sizes and values that are not finite, symbols that
+        are expressions or stand for two things, a start covariance that is none, no states or no outputs.
     NonlinearSystemError
         If an expression is not linear in x, w, u, or depends on a symbol that was not declared.
+    UnknownNameError
+        A start covariance for a source that is not there.
     """
 
     name: str
@@ -117,6 +133,7 @@ class LinearSystem:
     structure: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self):
+        check_labels(self)
         sizes = {
             "states": (self.x.numel(), len(self.states), self.derivative.numel()),
             "noises": (self.w.numel(), len(self.noises)),
@@ -127,7 +144,7 @@ class LinearSystem:
         }
         for what, counts in sizes.items():
             if len(set(counts)) > 1:
-                raise NonlinearSystemError(f"system '{self.name}': {what} disagree in number: {counts}")
+                raise SystemDefinitionError(f"system '{self.name}': {what} disagree in number: {counts}")
         if not self.end > self.start:
             raise TimeRangeError(f"system '{self.name}' ends at {self.end:g} s, before its start at {self.start:g} s")
         object.__setattr__(self, "discontinuities", switch_times(self.discontinuities, self.start))
@@ -136,13 +153,17 @@ class LinearSystem:
             ("noise", self.noise_names),
             ("output", self.output_names),
             ("parameter", self.parameter_names),
+            ("input", self.input_names),
         ):
             repeated = {n for n in names if names.count(n) > 1}
             if repeated:
-                raise NonlinearSystemError(f"system '{self.name}' has more than one {label} '{repeated.pop()}'")
-        for source in self.start_covariance:
-            if source not in self.sources:
-                raise UnknownNameError("noise source", source, self.sources)
+                raise SystemDefinitionError(f"system '{self.name}' has more than one {label} '{repeated.pop()}'")
+        check_symbols(self)
+        check_keys("noise source", self.start_covariance, self.sources)
+        covariance = {
+            source: checked_covariance(self, source, given) for source, given in self.start_covariance.items()
+        }
+        object.__setattr__(self, "start_covariance", covariance)
         signals = ca.vertcat(self.x, self.w, self.u)
         for what, expression, labels in (
             ("derivative of", self.derivative, self.state_names),
@@ -251,14 +272,22 @@ class LinearSystem:
         return -ca.jtimes(self.derivative, self.x, adjoint, True)
 
     def start_covariance_matrix(self, source: str, values: np.ndarray) -> np.ndarray:
-        """Return P0 of a source for the parameter values ``values``, shape (n, n)."""
+        """Return P0 of a source for the parameter values ``values``, shape (n, n).
+
+        Raises
+        ------
+        SystemDefinitionError
+            These values make it indefinite or not finite.
+        """
         n = len(self.states)
         given = self.start_covariance.get(source)
         if given is None:
             return np.zeros((n, n))
         if isinstance(given, np.ndarray):
             return given
-        return np.array(ca.Function("p0", [self.p], [ca.densify(given)])(values), dtype=float).reshape(n, n)
+        found = np.array(ca.Function("p0", [self.p], [ca.densify(given)])(values), dtype=float).reshape(n, n)
+        check_covariance(self, source, found)
+        return found
 
 
 def define_system(
@@ -293,7 +322,9 @@ def define_system(
         Known inputs; they make the mean.
     sources : mapping of noise name to source, optional
         Without it every noise is a source of its own.
-    units, scales : mappings by state, output or parameter name, optional
+    units : mapping by state, output or parameter name, optional
+    scales : mapping by state or output name, optional
+        Typical sizes, by which integrators weigh errors.
     start_covariance : mapping of source to (n, n) SX or array, optional
     start, end : float
         Seconds.
@@ -303,6 +334,13 @@ def define_system(
     Returns
     -------
     LinearSystem
+
+    Raises
+    ------
+    SystemDefinitionError, NonlinearSystemError, TimeRangeError
+        As :class:`LinearSystem`, and symbols or expressions of another kind than casadi.SX.
+    UnknownNameError
+        A name in ``units``, ``scales``, ``sources`` or ``start_covariance`` that nothing carries.
 
     Examples
     --------
@@ -315,34 +353,42 @@ def define_system(
     """
     units, scales, sources = units or {}, scales or {}, sources or {}
     parameters, inputs = parameters or {}, inputs or {}
+    check_keys("state, output or parameter", units, (*states, *outputs, *parameters))
+    check_keys("state or output", scales, (*states, *outputs))
+    check_keys("noise", sources, noises)
+    equations = {n: pair("state", n, value, "(symbol, derivative)") for n, value in states.items()}
+    known = {n: pair("input", n, value, "(symbol, value over time)") for n, value in inputs.items()}
+    numbers = {n: pair("parameter", n, value, "(symbol, number)") for n, value in parameters.items()}
 
-    def column(expressions) -> ca.SX:
-        return ca.vertcat(ca.SX(0, 1), *expressions)
+    def column(entries: Iterable[ca.SX]) -> ca.SX:
+        return ca.vertcat(ca.SX(0, 1), *entries)
 
     return LinearSystem(
         name=name,
-        time=time,
-        x=column(s for s, _ in states.values()),
-        w=column(noises.values()),
-        u=column(s for s, _ in inputs.values()),
-        p=column(s for s, _ in parameters.values()),
+        time=scalar_symbol("time", "t", time),
+        x=column(scalar_symbol("state", n, s) for n, (s, _) in equations.items()),
+        w=column(scalar_symbol("noise", n, s) for n, s in noises.items()),
+        u=column(scalar_symbol("input", n, s) for n, (s, _) in known.items()),
+        p=column(scalar_symbol("parameter", n, s) for n, (s, _) in numbers.items()),
         v=ca.SX(0, 1),
-        derivative=column(d for _, d in states.values()),
-        output=column(outputs.values()),
+        derivative=column(scalar_expression("the derivative of state", n, d) for n, (_, d) in equations.items()),
+        output=column(scalar_expression("output", n, e) for n, e in outputs.items()),
         states=tuple(State(n, units.get(n, "1"), scales.get(n, 1.0)) for n in states),
         noises=tuple(Noise(n, sources.get(n, n)) for n in noises),
         outputs=tuple(Output(n, units.get(n, "1"), scales.get(n, 1.0)) for n in outputs),
-        parameters=tuple(Parameter(n, float(value), units.get(n, "1")) for n, (_, value) in parameters.items()),
+        parameters=tuple(
+            Parameter(n, finite_number("parameter", n, value), units.get(n, "1")) for n, (_, value) in numbers.items()
+        ),
         input_names=tuple(inputs),
-        input_values=column(ca.SX(value) for _, value in inputs.values()),
+        input_values=column(scalar_expression("the value of input", n, value) for n, (_, value) in known.items()),
         start_covariance=start_covariance or {},
         discontinuities=tuple(discontinuities),
         start=start,
         end=end,
         structure={
-            "states": ", ".join(states),
-            "noises": ", ".join(noises),
-            "outputs": ", ".join(outputs),
-            "inputs": ", ".join(inputs) or "none",
+            "states": ", ".join(map(str, states)),
+            "noises": ", ".join(map(str, noises)),
+            "outputs": ", ".join(map(str, outputs)),
+            "inputs": ", ".join(map(str, inputs)) or "none",
         },
     )

@@ -111,7 +111,10 @@ def discretise(executable: ExecutableSystem, times: Sequence[float], substep: fl
         mean.append(C[-1] @ state + G @ inputs[:, 0])
     start = [system.start_covariance_matrix(name, executable.parameters) for name in system.sources]
     steps = Steps(
-        symmetric_root(np.array(start) / np.outer(scale, scale)), transition, symmetric_root(added), np.array(C)
+        symmetric_root(np.reshape(start, (s, n, n)) / np.outer(scale, scale)),
+        transition,
+        symmetric_root(added),
+        np.array(C),
     )
     return Discretisation(np.asarray(times, float), steps, added, np.array(mean))
 
