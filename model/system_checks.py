@@ -31,7 +31,7 @@ def scalar_symbol(kind: str, name: str, value: Any) -> ca.SX:
     _refuse_mx(kind, name, value)
     if not isinstance(value, ca.SX):
         raise SystemDefinitionError(
-            f"{kind} '{name}' is {type(value).__name__} {_short(value)}, not a symbol; make one with casadi.SX.sym('{name}')"
+            f"{kind} '{name}' is {type(value).__name__} {_short(value)}, not a symbol; make one with casadi.SX.sym"
         )
     if value.numel() != 1:
         raise SystemDefinitionError(
@@ -39,7 +39,7 @@ def scalar_symbol(kind: str, name: str, value: Any) -> ca.SX:
         )
     if not value.is_symbolic():
         raise SystemDefinitionError(
-            f"{kind} '{name}' is the expression {_short(value)}, not a symbol; make one with casadi.SX.sym('{name}') and "
+            f"{kind} '{name}' is the expression {_short(value)}, not a symbol; make one with casadi.SX.sym and "
             "write the expression where it is used"
         )
     return value
@@ -54,12 +54,13 @@ def scalar_expression(kind: str, name: str, value: Any) -> ca.SX:
         If it is neither an SX expression of one entry nor a number.
     """
     _refuse_mx(kind, name, value)
-    number = isinstance(value, Real) and not isinstance(value, bool | np.bool_)
-    if not (number or isinstance(value, ca.SX | ca.DM)):
+    if isinstance(value, Real) and not isinstance(value, bool | np.bool_):
+        return ca.SX(float(value))
+    if not isinstance(value, ca.SX | ca.DM):
         raise SystemDefinitionError(
             f"{kind} '{name}' is {type(value).__name__} {_short(value)}; give a number or an expression of casadi.SX"
         )
-    expression = ca.densify(ca.SX(float(value) if number else value))
+    expression = ca.densify(ca.SX(value))
     if expression.numel() != 1:
         raise SystemDefinitionError(f"{kind} '{name}' has {expression.numel()} entries; give each a name of its own")
     return expression
@@ -137,8 +138,8 @@ def check_labels(system: LinearSystem) -> None:
             raise SystemDefinitionError(f"{where}: the symbol of output '{output.name}' {why}")
     if COMBINED in system.sources:
         raise SystemDefinitionError(
-            f"{where}: a noise source cannot be called '{COMBINED}', which is the sum over all sources in every result; "
-            "rename it"
+            f"{where}: a noise source cannot be called '{COMBINED}', which is the sum over all sources in every "
+            "result; rename it"
         )
     for kind, entry in (*(("state", s) for s in system.states), *(("output", o) for o in system.outputs)):
         if not finite_number(f"{where}: the scale of {kind}", entry.name, entry.scale) > 0:
@@ -192,9 +193,9 @@ def check_symbols(system: LinearSystem) -> None:
         if _calls(expressions):
             name = next(name for i, name in enumerate(names) if _calls(expressions[i]))
             raise SystemDefinitionError(
-                f"system '{system.name}': the {what} '{name}' calls a function (casadi.interpolant, external code), which "
-                "has no C form here; write it with arithmetic, elementary functions and if_else, or as a table of the "
-                "system"
+                f"system '{system.name}': the {what} '{name}' calls a function (casadi.interpolant, external code), "
+                "which has no C form here; write it with arithmetic, elementary functions and if_else, or make it a "
+                "table of the system"
             )
 
 
@@ -275,9 +276,7 @@ def check_covariance(system: LinearSystem, source: str, matrix: NDArray[np.float
     correlation = matrix[np.ix_(inside, inside)] / size[np.ix_(inside, inside)]
     least = float(np.linalg.eigvalsh(correlation).min(initial=0.0))
     if least < -ROUNDING * max(1, len(correlation)):
-        raise SystemDefinitionError(
-            f"{where} is indefinite: its correlations have the negative eigenvalue {least:.2g}; no random start has them"
-        )
+        raise SystemDefinitionError(f"{where} is indefinite: its correlations have the negative eigenvalue {least:.2g}")
 
 
 def _refuse_mx(kind: str, name: str, value: Any) -> None:

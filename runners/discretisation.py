@@ -109,13 +109,10 @@ def discretise(executable: ExecutableSystem, times: Sequence[float], substep: fl
         y, G, inputs = outputs(time, last.low, last.high)
         C.append(y * scale)
         mean.append(C[-1] @ state + G @ inputs[:, 0])
-    start = [system.start_covariance_matrix(name, executable.parameters) for name in system.sources]
-    steps = Steps(
-        symmetric_root(np.reshape(start, (s, n, n)) / np.outer(scale, scale)),
-        transition,
-        symmetric_root(added),
-        np.array(C),
-    )
+    start = np.zeros((s, n, n))
+    for k, name in enumerate(system.sources):
+        start[k] = system.start_covariance_matrix(name, executable.parameters)
+    steps = Steps(symmetric_root(start / np.outer(scale, scale)), transition, symmetric_root(added), np.array(C))
     return Discretisation(np.asarray(times, float), steps, added, np.array(mean))
 
 
