@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from .csv_table import read_csv_table
 from .errors import DataError
+from .folder_files import file_inside
 from .loads import REACTION_COLUMNS, load_columns
 from .local_aerodynamics import local_load_columns
 from .tables import Table
@@ -73,7 +74,7 @@ def load_station_loads(vehicle: Vehicle) -> StationLoads:
             file=vehicle.folder / "vehicle.toml",
             column=f"tables.{KEY}",
         )
-    file: Path = vehicle.folder / entry.file
+    file: Path = file_inside(vehicle.folder, entry.file)
     csv = read_csv_table(file, "time", "s", order="not decreasing")
     columns = along_columns(len(vehicle.bending), [tank.name for tank in vehicle.slosh])
     for name, unit, _ in (*ARGUMENTS, *columns):

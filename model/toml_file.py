@@ -11,6 +11,7 @@ import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, ValidationInfo, field_validator
 
 from .errors import DataError, suggestion
+from .folder_files import OwnPath
 
 
 def _whole(value: Any) -> Any:
@@ -68,19 +69,19 @@ def read_toml(file: Path, model: type[File], changes: Mapping[str, Any] | None =
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise DataError(f"is not valid TOML: {error}", file=file) from None
     for dotted, value in (changes or {}).items():
-        _put(data, dotted, value, file)
+        _put(data, dotted, _own(value), file)
     return validated(data, model, file)
 
 
 def validated(data: Mapping[str, Any], model: type[File], file: Path | None = None) -> File:
-    """Check the contents of a TOML file.
+    """Check the contents of a TOML file, or the same given in Python, where paths are the user's own.
 
     Raises
     ------
     DataError
     """
     try:
-        return model.model_validate(_plain(data))
+        return model.model_validate(_plain(data) if file is not None else _own(_plain(data)))
     except ValidationError as error:
         errors = error.errors()
         # a misspelt key is missing too; its spelling helps more
@@ -104,6 +105,15 @@ def _plain(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {key: _plain(item) for key, item in value.items()}
     return tuple(_plain(item) for item in value) if isinstance(value, list | tuple) else value
+
+
+def _own(value: Any) -> Any:
+    """Return a value whose texts, if they turn out to be paths, may lead anywhere."""
+    if isinstance(value, Mapping):
+        return {key: _own(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return type(value)(_own(item) for item in value)
+    return OwnPath(value) if isinstance(value, str) else value
 
 
 def _put(data: dict[str, Any], dotted: str, value: Any, file: Path) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 
 from .csv_table import CsvTable, read_csv_table
 from .errors import DataError, suggestion
+from .folder_files import file_inside
 from .load_relief import SCHEDULE_COLUMNS, mode_columns
 from .loads import REACTION_COLUMNS, load_columns
 from .local_aerodynamics import PREFIX, local_columns, local_load_columns
@@ -128,7 +129,7 @@ def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehi
     toml = folder / VEHICLE_FILE
     if not toml.is_file():
         raise DataError(f"holds no {VEHICLE_FILE}; start from 'ascentwind new-vehicle DIR --from as504'", file=folder)
-    file = read_vehicle_file(toml, changes)
+    file = read_vehicle_file(file_inside(folder, VEHICLE_FILE), changes)
     reader = _Reader(folder, toml, file)
     for name, columns in (
         ("rigid_body", RIGID_BODY),
@@ -241,7 +242,7 @@ class _Reader:
         self.discontinuities: set[float] = set()
 
     def read(self, name: str, entry: TableEntry, columns, argument: str, unit: str, unused=()) -> CsvTable:
-        csv = read_csv_table(self.folder / entry.file, argument, unit)
+        csv = read_csv_table(file_inside(self.folder, entry.file), argument, unit)
         x = csv.columns[argument]
         for column, column_unit, sign in columns:
             csv.column(column, column_unit)
@@ -321,7 +322,7 @@ def _load_wind(folder: Path, entry: WindEntry, reader: _Reader) -> WindModel:
     mean = Table("wind.mean", "m/s", h, csv.columns["mean"], interpolation)
     if entry.fitted:
         assert entry.filter is not None  # checked by WindEntry
-        file = folder / entry.filter
+        file = file_inside(folder, entry.filter)
         shaping_filter = read_filter(file)
         low, high = (float(x) for x in shaping_filter.altitude[[0, -1]])
         reader.sources.append(TableSource("wind.filter", file, "computed", shaping_filter.source, low, high))

@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 from pydantic import Field, model_validator
 
+from .folder_files import FileName
 from .toml_file import Name, NotNegative, Positive, Section, read_toml
 
 ExtraOutput = Literal["lateral_drift", "drift_rate", "dynamic_pressure_times_angle_of_attack", "load_components"]
@@ -16,7 +17,7 @@ ExtraOutput = Literal["lateral_drift", "drift_rate", "dynamic_pressure_times_ang
 class TableEntry(Section):
     """One CSV file: where it is, how it is interpolated, and where its numbers come from."""
 
-    file: str
+    file: FileName
     status: Literal["found", "computed", "assumed"]
     source: str
     interpolation: Literal["cubic", "pchip", "linear", "step"] = "cubic"
@@ -148,7 +149,7 @@ class WindEntry(Section):
     synthesis: Literal["fitted", "closed_form"] | None = None
     statistics: TableEntry
     standard_deviation: Literal["table", "cr103010_fit"] = "table"
-    filter: str | None = None
+    filter: FileName | None = None
     correlation: CorrelationEntry | None = None
 
     @model_validator(mode="after")

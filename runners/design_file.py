@@ -9,6 +9,7 @@ from typing import Literal
 from pydantic import Field
 
 from ..model.errors import DataError, UnknownNameError
+from ..model.folder_files import FileName, file_inside
 from ..model.shipped import find_vehicle
 from ..model.toml_file import Section, read_toml
 from .design_problem import LoadReliefProblem
@@ -38,7 +39,7 @@ class DesignEntry(Section):
     """The whole file; without ``vehicle`` the folder it stands in."""
 
     format: Literal[1]
-    vehicle: str | None = None
+    vehicle: FileName | None = None
     response: str = "bending_moment"
     times: str
     frozen_times: str | None = None
@@ -76,7 +77,7 @@ def find_design(where: str) -> Path:
     path = Path(where)
     if path.suffix == ".toml":
         return path
-    file = find_vehicle(where) / DESIGN_FILE
+    file = file_inside(find_vehicle(where), DESIGN_FILE)
     if not file.is_file():
         raise DataError(f"holds no {DESIGN_FILE}; write one (docs/design.md)", file=file.parent)
     return file

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from ..model.construction.construction_file import CONSTRUCTION_FILE
 from ..model.errors import OutputFolderError
+from ..model.folder_files import unsafe_to_copy
 from ..model.shipped import find_vehicle
 from ..model.vehicle import VEHICLE_FILE, load_vehicle
 
@@ -31,7 +32,7 @@ def copy_vehicle(source: str | Path, folder: Path) -> list[Path]:
         folder.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=folder.parent) as work:
             made = Path(work) / "vehicle"
-            shutil.copytree(start, made, copy_function=shutil.copyfile)
+            shutil.copytree(start, made, copy_function=shutil.copyfile, ignore=unsafe_to_copy(start))
             for file in (VEHICLE_FILE, CONSTRUCTION_FILE):
                 toml = made / file
                 if toml.is_file():

@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
+from ..folder_files import FileName
 from ..toml_file import Name, NotNegative, Positive, Section, Whole
 
 Status = Literal["found", "computed", "assumed", "memory"]
@@ -14,7 +15,7 @@ Status = Literal["found", "computed", "assumed", "memory"]
 class FileEntry(Section):
     """A CSV file; every row of it has its status and source."""
 
-    file: str
+    file: FileName
 
 
 class TankSectionEntry(Section):
@@ -53,7 +54,7 @@ class EngineEntry(Section):
     count: Annotated[Whole, Field(ge=1)]
     gimballed: bool
     exit_area_m2: NotNegative
-    file: str
+    file: FileName
     draws: dict[str, Positive]
     cutoff_s: float | None = None
     cutoff_event: Name
@@ -66,7 +67,7 @@ class NormalForceEntry(Section):
     """A part of the normal force; its slope over Mach number is the column of its name in ``file``."""
 
     name: Name
-    file: str
+    file: FileName
     station_m: Annotated[tuple[float, ...], Field(min_length=2)]
     shape: Annotated[tuple[NotNegative, ...], Field(min_length=2)]
     status: Status
@@ -81,7 +82,7 @@ class NormalForceEntry(Section):
 
 class PitchEntry(Section):
     kind: Literal["polynomials", "table", "gravity_turn"]
-    file: str
+    file: FileName
     time_base_s: float = 0.0
     begin_s: float
     arrest_s: float | None = None

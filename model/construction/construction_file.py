@@ -12,6 +12,7 @@ import numpy as np
 
 from ..csv_table import CsvTable, Order, read_csv_table
 from ..errors import DataError
+from ..folder_files import file_inside
 from ..toml_file import read_toml
 from .construction import Construction
 from .construction_entries import (
@@ -56,15 +57,15 @@ def load_construction(folder: Path, changes: Mapping[str, Any] | None = None) ->
     UnknownNameError
         An engine draws from a tank that is not there.
     """
-    toml = folder / CONSTRUCTION_FILE
+    toml = file_inside(folder, CONSTRUCTION_FILE)
     entry = read_toml(toml, ConstructionFile, changes)
-    masses = _masses(folder / entry.masses.file, entry.aft_end_m, entry.forward_end_m)
-    stiffness = _stiffness(folder / entry.stiffness.file)
-    drag = _drag(folder / entry.drag.file)
-    atmosphere = None if entry.atmosphere is None else _atmosphere(folder / entry.atmosphere.file)
+    masses = _masses(file_inside(folder, entry.masses.file), entry.aft_end_m, entry.forward_end_m)
+    stiffness = _stiffness(file_inside(folder, entry.stiffness.file))
+    drag = _drag(file_inside(folder, entry.drag.file))
+    atmosphere = None if entry.atmosphere is None else _atmosphere(file_inside(folder, entry.atmosphere.file))
     engines = tuple(_engine(folder, e) for e in entry.engines)
     normal_force = tuple(_normal_force(folder, e) for e in entry.normal_force)
-    pitch = _pitch(folder / entry.pitch.file, entry.pitch)
+    pitch = _pitch(file_inside(folder, entry.pitch.file), entry.pitch)
     tanks = []
     for tank in entry.tanks:
         with _located(toml, f"tanks.{tank.name}"):
@@ -95,11 +96,11 @@ def load_construction(folder: Path, changes: Mapping[str, Any] | None = None) ->
 
 def construction_files(folder: Path) -> tuple[Path, ...]:
     """Return construction.toml and every file that it names, in its order, each once."""
-    toml = folder / CONSTRUCTION_FILE
+    toml = file_inside(folder, CONSTRUCTION_FILE)
     entry = read_toml(toml, ConstructionFile)
     parts = (entry.masses, entry.stiffness, entry.drag, entry.atmosphere, entry.pitch)
     names = [p.file for p in (*parts, *entry.engines, *entry.normal_force) if p is not None]
-    return (toml, *(folder / name for name in dict.fromkeys(names)))
+    return (toml, *(file_inside(folder, name) for name in dict.fromkeys(names)))
 
 
 @contextmanager
@@ -171,7 +172,7 @@ def _atmosphere(file: Path) -> AtmosphereFactors:
 
 
 def _engine(folder: Path, entry: EngineEntry) -> EngineGroup:
-    table = _read(folder / entry.file, "time", "s")
+    table = _read(file_inside(folder, entry.file), "time", "s")
     thrust, flow = table.column("vacuum_thrust", "N"), table.column("mass_flow", "kg/s")
     for column in ("vacuum_thrust", "mass_flow"):
         table.require_positive(column)
@@ -192,7 +193,7 @@ def _engine(folder: Path, entry: EngineEntry) -> EngineGroup:
 
 
 def _normal_force(folder: Path, entry: NormalForceEntry) -> NormalForceComponent:
-    table = _read(folder / entry.file, "mach", "1")
+    table = _read(file_inside(folder, entry.file), "mach", "1")
     slope = table.column(entry.name, "1/rad")
     with _located(folder / CONSTRUCTION_FILE, f"normal_force.{entry.name}"):
         return NormalForceComponent(

@@ -14,6 +14,7 @@ import numpy as np
 from ...model.construction import Construction
 from ...model.construction.construction_file import CONSTRUCTION_FILE, construction_files, load_construction
 from ...model.errors import DataError, OutputFolderError
+from ...model.folder_files import file_inside, unsafe_to_copy
 from ...model.vehicle import VEHICLE_FILE, load_vehicle
 from ...model.vehicle_file import TableEntry, VehicleFile, read_vehicle_file
 from ..output import prepare_folder, write_whole
@@ -55,9 +56,10 @@ def build_vehicle(
         Raw inputs that cannot be used, or that vehicle.toml contradicts.
     OutputFolderError
     """
-    file = read_vehicle_file(folder / VEHICLE_FILE)
+    file = read_vehicle_file(file_inside(folder, VEHICLE_FILE))
     construction = load_construction(folder)
     check_agreement(folder / VEHICLE_FILE, file, construction)
+    check_outputs(folder, file)
     if out is not None and out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise OutputFolderError(f"{out} exists already and is not empty; choose another folder with --out")
     target = folder if out is None else out
@@ -71,7 +73,7 @@ def build_vehicle(
     try:
         with tempfile.TemporaryDirectory(dir=None if out is None else out.parent) as work:
             made = Path(work) / "vehicle"
-            shutil.copytree(folder, made, copy_function=shutil.copyfile)
+            shutil.copytree(folder, made, copy_function=shutil.copyfile, ignore=unsafe_to_copy(folder))
             for name, text in texts.items():
                 (made / name).parent.mkdir(parents=True, exist_ok=True)
                 (made / name).write_text(text)
@@ -82,7 +84,9 @@ def build_vehicle(
         raise OutputFolderError(f"{target} cannot be written ({error.strerror or error}); choose another") from None
     if out is None:
         for name, text in texts.items():
-            write_whole(target / name, lambda p, text=text: p.write_text(text))
+            path = file_inside(target, name)
+            prepare_folder(path.parent)
+            write_whole(path, lambda p, text=text: p.write_text(text))
     return numbers, [target / name for name in texts]
 
 
@@ -147,6 +151,28 @@ def check_agreement(toml: Path, file: VehicleFile, construction: Construction) -
                 "correct it",
                 f"loads.{i}.forward_of_gimbal_m",
             )
+
+
+def check_outputs(folder: Path, file: VehicleFile) -> None:
+    """Refuse a table that the build would write over something else: an input of its own, or another table."""
+    control, wind = file.control, file.wind
+    inputs = {path: "an input of the build" for path in construction_files(folder)}
+    given = [control.gains, wind.statistics, *(sensor.schedule for sensor in control.load_relief.values())]
+    inputs |= {folder / entry.file: "written by hand" for entry in given if entry is not None}
+    taken = {path.resolve(): what for path, what in inputs.items()}
+    for key, entry in table_entries(file).items():
+        path = file_inside(folder, entry.file)
+        if path.suffix.lower() != ".csv":
+            raise DataError(
+                f"'{entry.file}' would be written over; name a .csv file", file=folder / VEHICLE_FILE, column=key
+            )
+        if path.resolve() in taken:
+            raise DataError(
+                f"'{entry.file}' would be written over, but is {taken[path.resolve()]}; name another file",
+                file=folder / VEHICLE_FILE,
+                column=key,
+            )
+        taken[path.resolve()] = f"also named by {key}"
 
 
 def check_events(toml: Path, file: VehicleFile, flight: MeanFlight) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from ...model.errors import DataError, TimeRangeError
+from ...model.folder_files import FileName
 from ...model.toml_file import Section, Whole, read_toml, validated
 from ..sweep_engine import LARGEST_TOLERANCE, LEAST_TOLERANCE
 from ..times import parse_times
@@ -154,7 +155,7 @@ class ParameterStudyPlan(Section):
 
     format: Literal[1]
     title: str
-    vehicle: str | None = None
+    vehicle: FileName | None = None
     times: str | None = None
     responses: Names | None = None
     sources: Names | None = None
