@@ -103,6 +103,10 @@ class ExtrapolationWarning(AscentwindWarning):
     """Values beyond the end of a table were needed and held constant."""
 
 
+class PlausibilityWarning(AscentwindWarning):
+    """Two statements of a vehicle's files hardly go together."""
+
+
 def suggestion(name: str, known: Iterable[str]) -> str:
     """Return '; did you mean ...?' or a short list of what is known."""
     known = list(known)

@@ -15,6 +15,7 @@ from .folder_files import file_inside
 from .load_relief import SCHEDULE_COLUMNS, mode_columns
 from .loads import REACTION_COLUMNS, load_columns
 from .local_aerodynamics import PREFIX, local_columns, local_load_columns
+from .plausibility import check_plausibility
 from .switches import switch_times
 from .tables import Table
 from .vehicle_file import (
@@ -187,7 +188,7 @@ def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehi
             file=toml,
             column="start_time_s",
         )
-    return Vehicle(
+    vehicle = Vehicle(
         name=file.name,
         title=file.title,
         folder=folder,
@@ -199,6 +200,8 @@ def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehi
         discontinuities=switch_times((t for t in reader.discontinuities if start < t < last.last), start),
         sources=tuple(reader.sources),
     )
+    check_plausibility(vehicle)
+    return vehicle
 
 
 def _add_load_relief(reader: _Reader, file: VehicleFile) -> None:
