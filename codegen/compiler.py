@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import platform
 import shlex
 import shutil
+import signal
 import subprocess
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -47,7 +50,7 @@ class Compiler:
             With command and text.
         """
         command = [*self.command, *self.flags, "-o", str(library), str(source), "-lm"]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        done = run_program(command, environment={"TMPDIR": str(library.parent), "LC_ALL": "C"})
         if done.returncode != 0 or not library.is_file():
             raise CompilerError(command, done.returncode, done.stderr + done.stdout)
 
@@ -58,12 +61,12 @@ def find_compiler() -> Compiler | None:
     Raises
     ------
     CompilerError
-        If CC names a program that cannot be run.
+        If CC names a program that cannot be run, or cannot be read.
     """
     named = os.environ.get("CC")
     if named is not None and not named.strip():
         return None
-    for candidate in [shlex.split(named)] if named else [["cc"], ["gcc"], ["clang"]]:
+    for candidate in [_split(named)] if named else [["cc"], ["gcc"], ["clang"]]:
         if shutil.which(candidate[0]):
             command = tuple(candidate)
             return Compiler(command, _version(command), known_flags(command, (*FLAGS, NATIVE)))
@@ -72,9 +75,51 @@ def find_compiler() -> Compiler | None:
     return None
 
 
+def _split(named: str) -> list[str]:
+    try:
+        return shlex.split(named)
+    except ValueError as error:
+        raise CompilerError([named], 127, f"CC={named}: quotes that do not match ({error})") from None
+
+
+def run_program(
+    command: Sequence[str], given: str = "", environment: Mapping[str, str] | None = None
+) -> subprocess.CompletedProcess[str]:
+    """Run a program to its end; an exception meanwhile, such as Ctrl-C, ends it with all that it started.
+
+    Raises
+    ------
+    CompilerError
+        If it cannot be started.
+    """
+    pipe = subprocess.PIPE
+    try:
+        process = subprocess.Popen(
+            command, stdin=pipe, stdout=pipe, stderr=pipe, text=True, errors="replace", start_new_session=True,
+            env={**os.environ, **(environment or {})},
+        )  # fmt: skip
+    except OSError as error:
+        raise CompilerError(list(command), 126, f"{command[0]} cannot be run ({error.strerror or error})") from None
+    with process:
+        try:
+            printed, complained = process.communicate(given)
+        except BaseException:
+            _end(process)
+            raise
+    return subprocess.CompletedProcess(command, process.returncode, printed, complained)
+
+
+def _end(process: subprocess.Popen[str]) -> None:
+    """End a program and what it started: a compiler's driver leaves the work to others."""
+    if hasattr(os, "killpg"):
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+    process.kill()
+
+
 @lru_cache
 def _version(command: tuple[str, ...]) -> str:
-    done = subprocess.run([*command, "--version"], capture_output=True, text=True, check=False)
+    done = run_program([*command, "--version"])
     return (done.stdout or done.stderr).partition("\n")[0].strip() or "unknown version"
 
 
@@ -84,7 +129,7 @@ def known_flags(command: tuple[str, ...], flags: tuple[str, ...]) -> tuple[str, 
 
     def knows(flag: str) -> bool:
         check = [*command, flag, "-E", "-x", "c", "-"]
-        return subprocess.run(check, input="", capture_output=True, text=True, check=False).returncode == 0
+        return run_program(check).returncode == 0
 
     return tuple(flag for flag in flags if not flag.startswith("-m") or knows(flag))
 

@@ -15,6 +15,7 @@ from ..model.system import LinearSystem
 from .cache import CompiledLibrary, compiled_library
 from .compiler import find_compiler
 from .expressions import template_environment
+from .interruption import call
 
 LANES = 32  # runs side by side in the vector registers
 _TEMPLATE = "ensemble.c.jinja"
@@ -71,10 +72,10 @@ class CompiledEnsemble:
         moments = np.zeros((k, outputs, steps.start.shape[0] + 1, 2))
         paths = np.empty((runs, k, outputs)) if keep_paths else None
         arrays = [np.ascontiguousarray(a) for a in (steps.start, steps.transition, steps.noise, steps.output)]
-        self._handle.ensemble(
-            ctypes.c_uint64(seed), ctypes.c_uint32(first), ctypes.c_int(runs), ctypes.c_int(k),
+        call(
+            self._handle.ensemble, ctypes.c_uint64(seed), ctypes.c_uint32(first), ctypes.c_int(runs), ctypes.c_int(k),
             *(a.ctypes.data_as(ctypes.c_void_p) for a in (*arrays, moments)),
-            paths.ctypes.data_as(ctypes.c_void_p) if paths is not None else None,
+            ctypes.c_void_p(None) if paths is None else paths.ctypes.data_as(ctypes.c_void_p),
         )  # fmt: skip
         return moments, paths
 

@@ -9,15 +9,16 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..model.errors import AscentwindError, DataError, IntegrationError
+from ..model.errors import AscentwindError, DataError, IntegrationError, StepBudgetError
 from ..model.system import LinearSystem
 from .cache import CompiledLibrary, compiled_library
 from .compiled import ExecutableSystem
 from .compiler import Compiler, find_compiler, known_flags
 from .functions import state_scales
-from .sweep_source import SweepFunctions, sweep_fingerprint, sweep_functions, sweep_source
+from .interruption import call
+from .sweep_source import MOST_STEPS, SweepFunctions, sweep_fingerprint, sweep_functions, sweep_source
 
-NOT_FINITE, TOO_SMALL_A_STEP, OUT_OF_RANGE = 1, 2, 3  # as in the template
+NOT_FINITE, TOO_SMALL_A_STEP, OUT_OF_RANGE, TOO_MANY_STEPS = 1, 2, 3, 4  # as in the template
 COUNTERS = ("steps", "rejected", "evaluations")
 
 
@@ -103,7 +104,8 @@ class CompiledSweep:
         covariance, mean, error = np.empty((k, s, r, r)), np.empty((k, r)), np.empty((k, s, r))
         kept = np.empty((k, n, n)) if transition else None
         counters, failure = np.zeros(3), np.zeros(2)
-        code = self._handle.sweep(
+        code = call(
+            self._handle.sweep,
             *self._arguments(executable, segments, tolerance),
             *map(_pointer, (state, np.zeros(n), covariance, mean, error, kept, counters, failure)),
         )
@@ -124,8 +126,10 @@ class CompiledSweep:
         points = segments.end.size + 1
         states, outputs = np.empty((points, len(self.system.states))), np.empty((points, len(self.system.outputs)))
         counters, failure = np.zeros(3), np.zeros(2)
-        code = self._handle.mean_history(
-            *self._arguments(executable, segments, tolerance), *map(_pointer, (states, outputs, counters, failure))
+        code = call(
+            self._handle.mean_history,
+            *self._arguments(executable, segments, tolerance),
+            *map(_pointer, (states, outputs, counters, failure)),
         )
         self._check(code, failure, executable, tolerance)
         return states, outputs, _named(counters)
@@ -163,6 +167,8 @@ class CompiledSweep:
                 f"a tolerance of {tolerance:g} a step cannot be met at t = {time:g} s; loosen it, or look for a jump "
                 "that no event declares"
             )
+        if code == TOO_MANY_STEPS:
+            raise StepBudgetError(MOST_STEPS, f"t = {time:.6g} s", time=time)
         if code == OUT_OF_RANGE:
             raise IntegrationError(
                 f"the responses leave the range of numbers near t = {time:g} s; the system grows without bound there "

@@ -75,6 +75,30 @@ class IntegrationError(AscentwindError):
     """An integrator gave up before the end of the interval."""
 
 
+class StepBudgetError(IntegrationError):
+    """An integration would take more steps than a vehicle needs: something in it is far too fast.
+
+    Parameters
+    ----------
+    steps : int
+        More are needed.
+    where : str
+        Where the integration stood, such as 't = 12 s'.
+    time : float, optional
+        The same as a flight time, s.
+    fastest : str, optional
+        The fastest root there and the states that take part in it.
+    """
+
+    def __init__(self, steps: int, where: str, *, time: float | None = None, fastest: str | None = None):
+        self.steps, self.where, self.time, self.fastest = steps, where, time, fastest
+        why = f"the fastest root there is {fastest}" if fastest else "something in the system is far too fast"
+        super().__init__(
+            f"the integration needs more than {steps:,} steps and was ended at {where}; {why}: look for swapped "
+            "columns or a wrong unit in what makes it (frequency, mass, damping, gain, filter)"
+        )
+
+
 class OutputFolderError(AscentwindError):
     """Results cannot be written where they were asked for."""
 

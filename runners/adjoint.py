@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 
 from ..codegen.compiled import ExecutableSystem
 from ..codegen.functions import state_scales
+from ..model.errors import StepBudgetError
 from .integration import Counters, Integrator, IntegratorOptions
+from .step_budget import naming_fastest_root
 from .time_nodes import interval_before, intervals, time_nodes
 
 
@@ -65,7 +67,7 @@ class AdjointSolver:
     """Runs the adjoint of a system backward with CVODES."""
 
     def __init__(self, executable: ExecutableSystem, options: IntegratorOptions):
-        self._executable = executable
+        self._executable, self._options = executable, options
         self._integrator = Integrator(executable.functions.adjoint, options)
         system = executable.system
         self._state_scale = state_scales(system)
@@ -85,7 +87,7 @@ class AdjointSolver:
 
         Raises
         ------
-        IntegrationError
+        IntegrationError, StepBudgetError
         """
         s, system = len(self._executable.system.sources), self._executable.system
         node = float(time_nodes(system, [time])[0])
@@ -112,8 +114,11 @@ class AdjointSolver:
                 interval.end, interval.end - interval.begin, interval.low, interval.high
             )
             where = f"of the adjoint from {interval.end:g} s back to {interval.begin:g} s (t2 = {time:g} s)"
-            states, integrals, statistics = self._integrator.run(scaled.ravel("F"), parameters, where)
-            counters.add(statistics)
+            with naming_fastest_root(self._executable):
+                states, integrals, statistics = self._integrator.run(scaled.ravel("F"), parameters, where)
+                counters.add(statistics)
+                if counters.totals["nsteps"] > self._options.max_steps:
+                    raise StepBudgetError(self._options.max_steps, f"t = {interval.begin:.6g} s", time=interval.begin)
             scaled = states[:, -1].reshape(scaled.shape, order="F")
             quadratures += integrals[:, -1].reshape(quadratures.shape)
         return scaled, quadratures, counters
@@ -129,7 +134,8 @@ class AdjointSolver:
             points = max(1, int(np.ceil(span / spacing - 1e-9)))
             parameters = self._executable.integrator_parameters(interval.end, span, interval.low, interval.high)
             where = f"of the adjoint from {interval.end:g} s back to {interval.begin:g} s (t2 = {time:g} s)"
-            states, _, _ = self._integrator.run(scaled.ravel("F"), parameters, where, points)
+            with naming_fastest_root(self._executable):
+                states, _, _ = self._integrator.run(scaled.ravel("F"), parameters, where, points)
             columns = np.concatenate([scaled.ravel("F")[:, None], states], axis=1)
             at = np.linspace(interval.end, interval.begin, points + 1)
             B, E = self._executable.input_matrices(at, interval.low, interval.high)

@@ -7,9 +7,8 @@ from typing import Annotated
 
 import typer
 
+from .entry import INTERRUPTED
 from .terminal import console, errors, progress_bar
-
-INTERRUPTED = 130  # exit code of a shell for Ctrl-C
 
 
 def study(

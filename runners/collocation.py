@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from scipy.linalg import get_lapack_funcs
 
 from ..codegen.elimination import elimination_plan
+from ..codegen.interruption import call
 from ..codegen.node_functions import NodeMatrix
 from ..model.errors import IntegrationError
 from .collocation_grid import NODES, STAGES, WEIGHTS, Grid
@@ -124,7 +125,7 @@ class CompiledCollocation:
         self._regular = True
         if keep:
             steps = ctypes.c_long(grid.steps.size)
-            self._regular = bool(code.collocation_factorise(steps, *map(_pointer, self._arrays)))
+            self._regular = bool(call(code.collocation_factorise, steps, *map(_pointer, self._arrays)))
 
     @cached_property
     def _exchanging(self) -> Collocation:
@@ -147,7 +148,7 @@ class CompiledCollocation:
             factors = np.empty_like(factors)  # several threads may solve at once
         arrays = (np.ascontiguousarray(forcing), state, stages, edges, np.empty(STAGES * state.size))
         pointers = (*map(_pointer, (*given, factors)), ctypes.c_int(self._keep), *map(_pointer, arrays))
-        return (stages, edges) if code(ctypes.c_long(forcing.shape[0]), *pointers) else None
+        return (stages, edges) if call(code, ctypes.c_long(forcing.shape[0]), *pointers) else None
 
 
 def _pointer(array: NDArray) -> ctypes.c_void_p:

@@ -27,6 +27,7 @@ from .time_nodes import Interval, interval_before, intervals, time_nodes
 
 LARGEST_NORM = 1.0  # of an exponent whose series is summed; with TERMS terms it leaves 1e-13
 TERMS = 15
+MOST_SUBSTEPS = 200_000
 TOGETHER = 512  # substeps computed at once
 POINTS, WEIGHTS = np.polynomial.legendre.leggauss(3)
 
@@ -134,6 +135,12 @@ def _substeps(
 ) -> Iterator[tuple[NDArray, NDArray, NDArray]]:
     """Yield transition matrix, added covariances and added mean of each piece, which holds no jump."""
     n = scale.size
+    needed = sum((p.end - p.begin) / substep for p in pieces)
+    if needed > MOST_SUBSTEPS:
+        raise IntegrationError(
+            f"substeps of {substep:g} s make {needed:.3g} over the flight; choose longer ones, "
+            f"{MOST_SUBSTEPS:,} at most"
+        )
     counts = [2 ** max(0, int(np.ceil(np.log2((p.end - p.begin) / substep) - 1e-9))) for p in pieces]
     ends = np.cumsum(counts)
     together = [np.flatnonzero((ends - 1) // TOGETHER == block) for block in range(sum(counts) // TOGETHER + 1)]

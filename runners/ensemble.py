@@ -7,7 +7,6 @@ remains is the sampling error, which the intervals show.
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -17,6 +16,7 @@ from scipy.stats import chi2, t
 
 from ..codegen.compiled import ExecutableSystem
 from ..codegen.ensemble import compiled_ensemble
+from ..codegen.interruption import Workers
 from ..model.errors import AscentwindError
 from .cores import available_cores
 from .discretisation import discretise
@@ -147,7 +147,7 @@ def run_ensemble(executable: ExecutableSystem, times: list[float], options: Ense
         size = min(CHUNK, options.runs - first)
         return engine.run(found.steps, options.seed, first, size, keep_paths=first < options.paths)
 
-    with ThreadPoolExecutor(options.threads or available_cores()) as pool:
+    with Workers(options.threads or available_cores()) as pool:
         results = list(pool.map(chunk, firsts))
     at = np.searchsorted(grid, times)
     deviations = [paths for _, paths in results if paths is not None]

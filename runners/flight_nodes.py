@@ -11,10 +11,13 @@ from numpy.typing import NDArray
 
 from ..codegen.compiled import ExecutableSystem
 from ..codegen.node_functions import NodeFunctions, NodeMatrix
+from ..model.errors import StepBudgetError
 from .collocation import Collocation, CompiledCollocation, collocation
 from .collocation_grid import STAGES, Grid, collocation_grid, longest_step, tables_at
+from .step_budget import naming_fastest_root
 
 FROZEN = 7  # times at which the roots of A are looked at
+MOST_STEPS = 100_000  # of the grid; AS-504 takes 4000
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +65,10 @@ class FlightNodes:
             spread = system.start + (max(times) - system.start) * (np.arange(FROZEN) + 0.5) / FROZEN
             frozen = functions.matrices(spread, tables_at(executable.groups, spread), numbers)
             step = longest_step(frozen["A"].dense)
+        if max(times) - system.start > MOST_STEPS * step:
+            time = 0.5 * (system.start + max(times))
+            with naming_fastest_root(executable):
+                raise StepBudgetError(MOST_STEPS, f"t = {time:.6g} s", time=time)
         grid = collocation_grid(system, executable.groups, times, step)
         nodes = grid.nodes.ravel()
         tables = tables_at(executable.groups, nodes)

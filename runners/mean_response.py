@@ -16,6 +16,7 @@ from ..codegen.functions import state_scales
 from ..model.assemble import MEAN_TABLES
 from ..model.tables import TableGroup
 from .integration import Integrator, IntegratorOptions
+from .step_budget import naming_fastest_root
 from .time_nodes import intervals
 
 TOLERANCE = 1e-9
@@ -66,7 +67,8 @@ def mean_response(
             interval.begin, interval.end - interval.begin, interval.low, interval.high
         )
         where = f"of the mean response from {interval.begin:g} s to {interval.end:g} s"
-        scaled, _, _ = integrator.run(states[-1] / scale, parameters, where, inside.size)
+        with naming_fastest_root(executable):
+            scaled, _, _ = integrator.run(states[-1] / scale, parameters, where, inside.size)
         found = scaled * scale[:, None]
         at = inside if outputs else np.concatenate([[times[0]], inside])
         columns = found if outputs else np.concatenate([states[-1][:, None], found], axis=1)

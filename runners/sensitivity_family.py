@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from ..codegen.interruption import Workers
 from ..codegen.node_functions import node_functions
 from .cores import available_cores
 from .flight_nodes import FlightNodes
@@ -49,7 +49,7 @@ def sensitivities(
         gradient = pair.gradient(*request.factors(pair))
         return request.value(pair.variance, pair.mean), gradient.parameters[rows]
 
-    with ThreadPoolExecutor(available_cores()) as pool:
+    with Workers(available_cores()) as pool:
         found = list(pool.map(one, [(time, request) for time in ends for request in requests]))
     shape = (len(ends), len(names))
     values = np.array([value for value, _ in found]).reshape(shape)

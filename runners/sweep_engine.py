@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
@@ -12,11 +11,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..codegen.compiled import ExecutableSystem
+from ..codegen.interruption import Workers
 from ..codegen.sweep import CompiledSweep, Segments, compiled_sweep
 from ..model.errors import AscentwindError, IntegrationError, TimeRangeError
 from ..model.system import LinearSystem
 from .cores import available_cores
 from .mean_response import MeanResponse, with_mean_tables
+from .step_budget import naming_fastest_root
 from .time_nodes import intervals, on_flight, time_nodes
 
 LONGEST_SEGMENT = 1.0  # s; weights of the error control are renewed and the Gramians stay well scaled
@@ -161,7 +162,8 @@ def sweep(
     # an end time at the start needs no integration, only a segment to read it in
     last = nodes[-1] if nodes[-1] > system.start else min(system.end, system.start + longest)
     segments = flight_segments(system, (*np.unique(nodes[nodes < last]).tolist(), float(last)), longest)
-    result = engine.run(executable, segments, relative_tolerance, transition=weighting_spacing is not None)
+    with naming_fastest_root(executable):
+        result = engine.run(executable, segments, relative_tolerance, transition=weighting_spacing is not None)
     at = np.where(nodes > system.start, np.searchsorted(segments.end, nodes), -1)
     found = result.covariance[at], result.mean[at], result.error[at]
     if at[0] < 0:
@@ -195,7 +197,8 @@ def with_sweep_mean_tables(
         which = np.searchsorted([p.end for p in pieces], times[1:])
         low, high = (np.array([getattr(p, side) for p in pieces])[which] for side in ("low", "high"))
         segments = Segments(float(times[0]), np.ascontiguousarray(times[1:]), low, high)
-        states, outputs, _ = engine.mean_history(of, segments, relative_tolerance)
+        with naming_fastest_root(of):
+            states, outputs, _ = engine.mean_history(of, segments, relative_tolerance)
         return MeanResponse(times, states, outputs)
 
     return with_mean_tables(executable, mean)
@@ -243,7 +246,7 @@ def batch(
         except AscentwindError as error:
             return error
 
-    with ThreadPoolExecutor(threads) as pool:
+    with Workers(threads) as pool:
         found = list(pool.map(one, parameter_sets))
     completed = {k: member for k, member in enumerate(found) if isinstance(member, SweepResult)}
     if len(completed) < len(found):

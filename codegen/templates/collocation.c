@@ -14,6 +14,7 @@ enum { STAGES = 4, BLOCK = STAGES * STAGES };
 #define NEARLY_SINGULAR 1e-12
 
 enum { UNIT = -1 };
+enum { STOPPED = -1, SINGULAR, SOLVED }; /* what the exported functions return */
 
 typedef struct {
   int states, blocks, entries;
@@ -211,20 +212,23 @@ static void solve_transposed_step(const Plan *p, const double *F, double *x) {
   }
 }
 
-/* Factorise all steps; return 0 if a pivot is nearly singular.
+/* Factorise all steps; return SINGULAR if a pivot nearly is.
  *
  * A        (steps, STAGES, entries)
- * factors  (steps, blocks, BLOCK) */
+ * factors  (steps, blocks, BLOCK)
+ * stop     looked at in every step; not zero ends the call */
 EXPORT int collocation_factorise(long steps, const int *plan, const double *h, const double *A, const double *tableau,
-                                 double *factors) {
+                                 double *factors, const volatile int *stop) {
   const Plan p = read_plan(plan);
   long step;
-  for (step = 0; step < steps; ++step)
-    if (!factorise(&p, h[step], A + step * STAGES * p.entries, tableau, factors + step * p.blocks * BLOCK)) return 0;
-  return 1;
+  for (step = 0; step < steps; ++step) {
+    if (*stop) return STOPPED;
+    if (!factorise(&p, h[step], A + step * STAGES * p.entries, tableau, factors + step * p.blocks * BLOCK)) return SINGULAR;
+  }
+  return SOLVED;
 }
 
-/* x' = A x + f from x at the start, which becomes x at the end; return 0 if a pivot is nearly singular.
+/* x' = A x + f from x at the start, which becomes x at the end; return SINGULAR if a pivot nearly is.
  *
  * kept     whether factors holds those of all steps; else it has room for one step, which is factorised on the way
  * f        (steps, STAGES, states)
@@ -233,7 +237,7 @@ EXPORT int collocation_factorise(long steps, const int *plan, const double *h, c
  * work     (STAGES states) */
 EXPORT int collocation_forward(long steps, const int *plan, const double *h, const double *A, const double *tableau,
                                double *factors, int kept, const double *f, double *x, double *stages, double *edges,
-                               double *work) {
+                               double *work, const volatile int *stop) {
   const Plan p = read_plan(plan);
   const double *d = tableau + BLOCK + STAGES;
   const Square a = load_square(tableau);
@@ -243,7 +247,8 @@ EXPORT int collocation_forward(long steps, const int *plan, const double *h, con
   for (step = 0; step < steps; ++step) {
     const double *force = f + step * STAGES * p.states;
     double *stage = stages + step * STAGES * p.states, *F = factors + (kept ? step * p.blocks * BLOCK : 0);
-    if (!kept && !factorise(&p, h[step], A + step * STAGES * p.entries, tableau, F)) return 0;
+    if (*stop) return STOPPED;
+    if (!kept && !factorise(&p, h[step], A + step * STAGES * p.entries, tableau, F)) return SINGULAR;
     for (r = 0; r < p.states; ++r) {
       const double own[STAGES] = { force[r], force[p.states + r], force[2 * p.states + r], force[3 * p.states + r] };
       store_four(work + STAGES * r, x[r] + h[step] * times(a, own));
@@ -259,7 +264,7 @@ EXPORT int collocation_forward(long steps, const int *plan, const double *h, con
     }
     memcpy(edges + (step + 1) * p.states, x, p.states * sizeof(double));
   }
-  return 1;
+  return SOLVED;
 }
 
 /* a' = -A' a - f from a at the end, which becomes a at the start; arguments as above.
@@ -267,7 +272,7 @@ EXPORT int collocation_forward(long steps, const int *plan, const double *h, con
  * The discrete adjoint of the steps above: M' V = d a + h b f, then a + the sum of V, as d adds up to nothing. */
 EXPORT int collocation_backward(long steps, const int *plan, const double *h, const double *A, const double *tableau,
                                 double *factors, int kept, const double *f, double *a, double *stages, double *edges,
-                                double *work) {
+                                double *work, const volatile int *stop) {
   const Plan p = read_plan(plan);
   const double *b = tableau + BLOCK, *d = b + STAGES;
   long step;
@@ -276,7 +281,8 @@ EXPORT int collocation_backward(long steps, const int *plan, const double *h, co
   for (step = steps - 1; step >= 0; --step) {
     const double *force = f + step * STAGES * p.states;
     double *stage = stages + step * STAGES * p.states, *F = factors + (kept ? step * p.blocks * BLOCK : 0);
-    if (!kept && !factorise(&p, h[step], A + step * STAGES * p.entries, tableau, F)) return 0;
+    if (*stop) return STOPPED;
+    if (!kept && !factorise(&p, h[step], A + step * STAGES * p.entries, tableau, F)) return SINGULAR;
     for (r = 0; r < p.states; ++r)
       for (i = 0; i < STAGES; ++i) work[STAGES * r + i] = d[i] * a[r] + h[step] * b[i] * force[i * p.states + r];
     solve_transposed_step(&p, F, work);
@@ -288,5 +294,5 @@ EXPORT int collocation_backward(long steps, const int *plan, const double *h, co
     }
     memcpy(edges + step * p.states, a, p.states * sizeof(double));
   }
-  return 1;
+  return SOLVED;
 }

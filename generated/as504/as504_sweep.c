@@ -46,8 +46,8 @@ enum {
 enum { TABLE_VALUES_1 = 80, GROUPS_1 = 3, SOURCES_1 = 3, NOISES_1 = 4 };
 enum { A_SIZE = 189, B_SIZE = 5, KNOWN_SIZE = 8, C_SIZE = 28 };
 #define SMALLEST 1e-10
-#define MOST_ATTEMPTS 200000 /* steps in one segment */
-enum { DONE, NOT_FINITE, TOO_SMALL_A_STEP, OUT_OF_RANGE }; /* what the exported functions return */
+#define MOST_STEPS 200000 /* in one call, rejected ones too */
+enum { STOPPED = -1, DONE, NOT_FINITE, TOO_SMALL_A_STEP, OUT_OF_RANGE, TOO_MANY_STEPS }; /* what the exported functions return */
 enum { V_mass, V_moment_of_inertia, V_center_of_gravity, V_altitude, V_relative_velocity, V_dynamic_pressure,
        V_axial_acceleration, V_axial_drag, V_thrust, V_control_thrust, V_normal_force_slope, V_center_of_pressure,
        V_control_attitude_factor, V_control_rate_factor, V_bending_1_frequency, V_bending_1_generalized_mass,
@@ -2233,12 +2233,13 @@ typedef struct {
 typedef struct { double steps, rejected, evaluations; } Counters;
 typedef struct { double time, entry; } Failure;
 
-static int sweep_segment(Flight *f, double begin, double end, double tolerance, const Weights *w, double *first, Segment *g, Counters *count, Failure *failure) {
+static int sweep_segment(Flight *f, double begin, double end, double tolerance, const Weights *w, double *first, Segment *g,
+                         Counters *count, Failure *failure, const volatile int *stop) {
   double x[BLOCKS][STATES * LANES];
   Matrices m;
   Step s;
   double t = end, step = *first; /* the last segment's first step: unit vectors excite what decays fast */
-  int i, j, b, attempts = 0;
+  int i, j, b;
   memset(x, 0, sizeof x);
   memset(g, 0, sizeof *g);
   for (i = 0; i < STATES; ++i) x[i / LANES][i * LANES + i % LANES] = 1.0;
@@ -2246,12 +2247,14 @@ static int sweep_segment(Flight *f, double begin, double end, double tolerance, 
     const double pieces = larger(1.0, ceil((t - begin) / step * (1.0 - 1e-12)));
     const double h = (t - begin) / pieces;
     double error = 0.0, factor;
-    if (h < 1e-10 * (1.0 + fabs(t)) || ++attempts > MOST_ATTEMPTS) {
+    const int many = count->steps + count->rejected >= MOST_STEPS;
+    if (*stop) return STOPPED;
+    if (h < 1e-10 * (1.0 + fabs(t)) || many) {
       failure->time = t;
       for (b = 0; b < BLOCKS; ++b)
         for (i = 0; i < STATES * LANES; ++i)
           if (fabs(x[b][i] * w->column[b][i]) > 1e8) return OUT_OF_RANGE;
-      return TOO_SMALL_A_STEP;
+      return many ? TOO_MANY_STEPS : TOO_SMALL_A_STEP;
     }
     evaluate_stages(f, t, -h, &m);
     for (b = 0; b < BLOCKS; ++b) step_block(&m, h, x[b], w->column[b], &s, b);
@@ -2409,10 +2412,12 @@ static void forward(const Segment *restrict g, const double *C, const double *P,
  * estimate       (count, SOURCES, RESPONSES) relative error of the standard deviation
  * transition     (count, STATES, STATES) or null
  * counters       steps, rejected steps, evaluations of A
- * failure        time, entry */
+ * failure        time, entry
+ * stop           looked at in every step; not zero ends the call */
 EXPORT int sweep(int count, double start, const double *end, const double *low, const double *high, const double *p,
                  const double *tables, double tolerance, const double *size, double *P, double *m, double *covariance,
-                 double *mean, double *estimate, double *transition, double *counters, double *failure) {
+                 double *mean, double *estimate, double *transition, double *counters, double *failure,
+                 const volatile int *stop) {
   double C[C_SIZE], direct[RESPONSES], next[STATES], P_next[SOURCES_1 * STATES * STATES];
   double inherited[SOURCES_1 * RESPONSES], largest[SOURCES_1], made = 0.0;
   Segment g;
@@ -2436,7 +2441,7 @@ EXPORT int sweep(int count, double start, const double *end, const double *low, 
     double *result = covariance + k * SOURCES * RESPONSES * RESPONSES;
     f.low = low[k];
     f.high = high[k];
-    code = sweep_segment(&f, begin, end[k], k ? tolerance : 0.1 * tolerance, &weights, &step, &g, &done, &why);
+    code = sweep_segment(&f, begin, end[k], k ? tolerance : 0.1 * tolerance, &weights, &step, &g, &done, &why, stop);
     if (code != DONE) break;
     evaluate_output(&f, end[k], C, direct);
     if (k == 0) {
@@ -2444,7 +2449,7 @@ EXPORT int sweep(int count, double start, const double *end, const double *low, 
        * because a flight that starts from rest changes fastest there. */
       forward(&g, C, P, P_next, result, inherited);
       weigh(C, &g, P_next, result, size, &weights);
-      code = sweep_segment(&f, begin, end[k], k ? tolerance : 0.1 * tolerance, &weights, &step, &g, &done, &why);
+      code = sweep_segment(&f, begin, end[k], k ? tolerance : 0.1 * tolerance, &weights, &step, &g, &done, &why, stop);
       if (code != DONE) break;
     }
     forward(&g, C, P, P_next, result, inherited);
@@ -2533,7 +2538,7 @@ static void mean_rate(const Matrices *restrict m, const int i, const double *res
  * outputs (count + 1, RESPONSES). */
 EXPORT int mean_history(int count, double start, const double *end, const double *low, const double *high, const double *p,
                         const double *tables, double tolerance, const double *size, double *states, double *outputs,
-                        double *counters, double *failure) {
+                        double *counters, double *failure, const volatile int *stop) {
   double k[STAGES][STATES], x[STATES], y[STATES], next[STATES], largest[STATES], C[C_SIZE], direct[RESPONSES];
   Matrices m;
   Flight f;
@@ -2559,9 +2564,11 @@ EXPORT int mean_history(int count, double start, const double *end, const double
       const double pieces = larger(1.0, ceil((end[n] - t) / step * (1.0 - 1e-12)));
       const double h = (end[n] - t) / pieces;
       double fine = 0.0, coarse = 0.0, error, factor;
-      if (h < 1e-10 * (1.0 + fabs(t))) {
+      const int many = counters[0] + counters[1] >= MOST_STEPS;
+      if (*stop) return STOPPED;
+      if (h < 1e-10 * (1.0 + fabs(t)) || many) {
         failure[0] = t;
-        return TOO_SMALL_A_STEP;
+        return many ? TOO_MANY_STEPS : TOO_SMALL_A_STEP;
       }
       evaluate_stages(&f, t, h, &m);
       mean_rate(&m, 0, x, k[0]);

@@ -13,6 +13,7 @@ from scipy.optimize import brentq
 from ...model.construction import Construction, earth
 from ...model.construction.ascent_equations import OBSERVED, AscentEquations, ascent_equations
 from ...model.errors import IntegrationError
+from ..integration import hearing_interrupts
 from .ascent_pieces import follows_velocity, piece
 
 Array = NDArray[np.float64]
@@ -90,7 +91,8 @@ class Ascent:
             return start
         parameters = np.concatenate([[begin, end - begin], coefficients])
         try:
-            found = self._integrators[along](x0=start / self._scale, p=parameters)["xf"].full().ravel()
+            with hearing_interrupts():
+                found = self._integrators[along](x0=start / self._scale, p=parameters)["xf"].full().ravel()
         except RuntimeError as error:
             reason = str(error).strip().splitlines()[-1]
             raise IntegrationError(

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Iterable
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from concurrent.futures import as_completed
 
+from ...codegen.interruption import Workers
 from ..cores import available_cores
 from ..study import Study
 from .compute import Chunk, ChunkResult, Task, compute_chunk
@@ -15,12 +16,9 @@ def compute_locally(
 ) -> Generator[tuple[Chunk, ChunkResult], None, None]:
     """Yield chunks as they are done, in any order.
 
-    When the caller stops, those not yet begun are dropped.
+    When the caller stops, those not yet done are dropped.
     """
-    pool = ThreadPoolExecutor(available_cores())
-    try:
+    with Workers(available_cores()) as pool:
         running = {pool.submit(compute_chunk, study, task, chunk): chunk for chunk in missing}
         for future in as_completed(running):
             yield running.pop(future), future.result()
-    finally:
-        pool.shutdown(cancel_futures=True)
