@@ -16,6 +16,14 @@ from .load_components import load_components
 from .loads import bending_moment, slosh_reaction, typical_moment
 from .local_aerodynamics import local_bending_moment, local_forces
 from .noise import NoiseProcess, noise_process
+from .noise_loads import (
+    CENTER_OF_PRESSURE,
+    MOVED_MODE,
+    loading_noises,
+    moved_modal_force,
+    needed_columns,
+    noise_load,
+)
 from .symbols import ParameterSymbols, TableSymbols
 from .system import LinearSystem, Noise, Output, State
 from .tables import TableGroup
@@ -42,6 +50,7 @@ SCALES = {
     "dynamic_pressure_times_angle_of_attack": 1e3,
     "bending_acceleration": 3.0,
     "slosh_acceleration": 3.0,
+    "relative_deviation": 0.01,
 }
 
 
@@ -132,6 +141,9 @@ def assemble(vehicle: Vehicle, wind_start_covariance: np.ndarray) -> LinearSyste
         moment += tables["axial_acceleration"] * ca.sum1(slosh_mass * xi)
     force = rigid_body.lateral_force(tables, area, alpha, beta, attitude)
     modal_force = bending.generalized_force(tables, area, bending_damping, eta, eta_rate, alpha, beta)
+    moved = ca.SX.sym("moved")  # m that the normal force moves forward, a deviation: zero in the equations
+    if MOVED_MODE in needed_columns(vehicle.file)[1]:
+        modal_force += moved_modal_force(tables, area, modes, alpha) * moved
     if options.local_angle_of_attack:
         local = local_forces(tables, area, attitude_rate, eta, eta_rate)
         force, moment, modal_force = force + local.force, moment + local.moment, modal_force + local.modal
@@ -175,6 +187,7 @@ def assemble(vehicle: Vehicle, wind_start_covariance: np.ndarray) -> LinearSyste
         (wind.states, wind.derivative, _numbered("wind", wind.states.numel(), "1", 1.0)),
         *((p.state, p.derivative, [State(f"deviation_{n}")] * p.state.numel()) for n, p in noises.items()),
     ]
+    loading = loading_noises(vehicle.file)
     outputs: list[tuple[Output, ca.SX]] = []
     for load in vehicle.file.loads:
         value = bending_moment(tables, load.output, tanks, alpha, beta, solved.bending, solved.slosh)
@@ -196,7 +209,10 @@ def assemble(vehicle: Vehicle, wind_start_covariance: np.ndarray) -> LinearSyste
         elif extra == "drift_rate":
             outputs.append((Output(extra, "m/s", SCALES["lateral_velocity"], "Y'"), lateral_velocity))
         elif extra == "load_components":
-            outputs += load_components(tanks, SCALES, attitude_rate, eta, eta_rate, solved.bending, xi, solved.slosh)
+            deviations = {n: noises[n].deviation for n in loading}
+            outputs += load_components(
+                tanks, SCALES, attitude_rate, eta, eta_rate, solved.bending, xi, solved.slosh, deviations
+            )
         else:
             q_alpha = tables["dynamic_pressure"] * alpha
             outputs.append((Output(extra, "Pa rad", SCALES[extra], "q alpha"), q_alpha))
@@ -207,12 +223,18 @@ def assemble(vehicle: Vehicle, wind_start_covariance: np.ndarray) -> LinearSyste
     states = tuple(s for b in blocks for s in b[2])
     both = ca.vertcat(derivative, output)
     for name, process in noises.items():
-        entry = vehicle.noise[name]
+        direct = ca.SX.zeros(both.numel())
+        for k, load in enumerate(vehicle.file.loads):  # the first outputs
+            coefficients = tables.under(f"loads.{load.output}.")
+            direct[x.numel() + k] = noise_load(
+                loading.get(name, ()), options.noise_loads, coefficients, tables, area, alpha, beta
+            )
         column = _deviation_column(
             vehicle,
             name,
-            entry.tables,
+            direct,
             both,
+            moved,
             tables,
             x,
             attitude,
@@ -223,7 +245,7 @@ def assemble(vehicle: Vehicle, wind_start_covariance: np.ndarray) -> LinearSyste
         derivative += column[: x.numel()] * process.deviation
         output += column[x.numel() :] * process.deviation
     derivative, output = ca.substitute(
-        [derivative, output], [ca.vertcat(alpha, beta)], [ca.vertcat(alpha_of_state, beta_of_state)]
+        [derivative, output], [ca.vertcat(alpha, beta, moved)], [ca.vertcat(alpha_of_state, beta_of_state, 0)]
     )
     noise_inputs = [Noise(f"wind_{i + 1}", "wind") for i in range(wind.white.numel())]
     noise_inputs += [Noise(n, n) for n in noises]
@@ -264,8 +286,9 @@ def _numbered(name: str, count: int, unit: str, scale: float) -> list[State]:
 def _deviation_column(
     vehicle: Vehicle,
     name: str,
-    deviating: Sequence[str],
+    direct: ca.SX,
     both: ca.SX,
+    moved: ca.SX,
     tables: TableSymbols,
     x: ca.SX,
     attitude: ca.SX,
@@ -273,9 +296,13 @@ def _deviation_column(
     beta: ca.SX,
     alpha_beta_of_state: ca.SX,
 ) -> ca.SX:
-    """Return d(derivative, output)/d ln(factor on the tables) at the mean response."""
-    file, key = vehicle.folder / "vehicle.toml", f"noise.{name}.tables"
-    column = ca.SX.zeros(both.numel())
+    """Return d(derivative, output)/d ln(factor on the tables) at the mean response.
+
+    ``direct`` is what the tables put into the outputs by coefficients that follow them, ``moved`` how far the normal
+    force moves with its centre.
+    """
+    file, key, deviating = vehicle.folder / "vehicle.toml", f"noise.{name}.tables", vehicle.noise[name].tables
+    column = direct
     for table in deviating:
         symbol = tables[table]
         if ca.depends_on(alpha_beta_of_state, symbol):
@@ -286,10 +313,12 @@ def _deviation_column(
                 column=key,
             )
         column += ca.jtimes(both, symbol, symbol)
+        if table == CENTER_OF_PRESSURE:
+            column += ca.jtimes(both, moved, symbol)
     if column.is_zero():
         raise DataError(f"deviations of {', '.join(deviating)} change nothing in the equations", file=file, column=key)
     means = [tables[n] for n in MEAN_TABLES]
-    column = ca.substitute(column, ca.vertcat(alpha, beta, attitude), ca.vertcat(*means))
+    column = ca.substitute(column, ca.vertcat(alpha, beta, attitude, moved), ca.vertcat(*means, 0))
     if ca.depends_on(column, x):
         raise DataError(
             f"deviations of {', '.join(deviating)} act on more than the mean angle of attack, engine angle and "
@@ -332,6 +361,7 @@ def _structure(vehicle: Vehicle, states: Sequence[State], groups: Sequence[Table
         "full coupling": str(vehicle.file.options.full_coupling).lower(),
         **({"local angle of attack": "true"} if vehicle.file.options.local_angle_of_attack else {}),
         **({"slosh reaction": "true"} if vehicle.file.options.slosh_reaction else {}),
+        **({"noise loads": vehicle.file.options.noise_loads} if vehicle.noise and vehicle.file.loads else {}),
         "states": str(len(states)),
         "table lengths": ", ".join(f"{g.name} {len(g.names)} x {g.knots.size}" for g in groups),
     }

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import casadi as ca
 
 from .system import Output
 
 
-def component_columns(modes: int, tanks: Sequence[str]) -> dict[str, str]:
+def component_columns(modes: int, tanks: Sequence[str], noises: Iterable[str] = ()) -> dict[str, str]:
     """Return the outputs that a moment is made of and the column of a load's table that multiplies each.
 
-    The columns of slosh_reaction have no output of their own: they act through the tanks.
+    The columns of slosh_reaction have no output of their own: they act through the tanks. ``noises`` are those that
+    load stations by themselves.
     """
     numbers = range(1, modes + 1)
     return {
@@ -24,6 +25,7 @@ def component_columns(modes: int, tanks: Sequence[str]) -> dict[str, str]:
         **{f"bending_displacement_{i}": f"bending_displacement_{i}" for i in numbers},
         **{f"bending_rate_{i}": f"bending_rate_{i}" for i in numbers},
         **{f"slosh_displacement_{tank}": f"slosh_displacement_{tank}" for tank in tanks},
+        **{f"relative_deviation_{name}": f"relative_deviation_{name}" for name in noises},
     }
 
 
@@ -36,6 +38,7 @@ def load_components(
     eta_acceleration: ca.SX,
     xi: ca.SX,
     xi_acceleration: ca.SX,
+    deviations: Mapping[str, ca.SX],
 ) -> list[tuple[Output, ca.SX]]:
     """Return those of them that are no outputs anyway."""
     found = [(Output("attitude_rate", "rad/s", scales["angle"], "phi'"), attitude_rate)]
@@ -53,4 +56,7 @@ def load_components(
              xi_acceleration[k]),
             (Output(f"slosh_displacement_{tank}", "m", scales["slosh"], f"xi of {tank}"), xi[k]),
         ]  # fmt: skip
+    for name, deviation in deviations.items():
+        output = Output(f"relative_deviation_{name}", "1", scales["relative_deviation"], f"n of {name}")
+        found.append((output, deviation))
     return found

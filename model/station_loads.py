@@ -13,6 +13,7 @@ from .errors import DataError
 from .folder_files import file_inside
 from .loads import REACTION_COLUMNS, load_columns
 from .local_aerodynamics import local_load_columns
+from .noise_loads import MOVED_LINE, needed_columns
 from .tables import Table
 from .vehicle import Vehicle
 
@@ -56,7 +57,7 @@ class StationLoads:
 
 def along_columns(modes: int, tanks: list[str]) -> tuple[tuple[str, str, str], ...]:
     """Return the coefficient columns of the table: name, unit, sign."""
-    return (*load_columns(modes, tanks), *REACTION_COLUMNS, *local_load_columns(modes))
+    return (*load_columns(modes, tanks), *REACTION_COLUMNS, MOVED_LINE, *local_load_columns(modes))
 
 
 def load_station_loads(vehicle: Vehicle) -> StationLoads:
@@ -77,6 +78,8 @@ def load_station_loads(vehicle: Vehicle) -> StationLoads:
     file: Path = file_inside(vehicle.folder, entry.file)
     csv = read_csv_table(file, "time", "s", order="not decreasing")
     columns = along_columns(len(vehicle.bending), [tank.name for tank in vehicle.slosh])
+    if MOVED_LINE not in needed_columns(vehicle.file)[0]:
+        columns = tuple(column for column in columns if column != MOVED_LINE)
     for name, unit, _ in (*ARGUMENTS, *columns):
         csv.column(name, unit)
     time, station = csv.columns["time"], csv.columns["station"]

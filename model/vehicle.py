@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +16,7 @@ from .folder_files import file_inside
 from .load_relief import SCHEDULE_COLUMNS, mode_columns
 from .loads import REACTION_COLUMNS, load_columns
 from .local_aerodynamics import PREFIX, local_columns, local_load_columns
+from .noise_loads import MOVED_LINE, MOVED_MODE, check_noises, form_of_tables, needed_columns
 from .plausibility import check_plausibility
 from .switches import switch_times
 from .tables import Table
@@ -144,15 +146,17 @@ def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehi
     tanks = [tank.name for tank in file.slosh]
     if len(set(tanks)) < len(tanks):
         raise DataError("two slosh tanks have the same name; rename one", file=toml, column="slosh")
+    file = _with_noise_loads(file, folder, toml)
+    of_loads, of_modes = needed_columns(file)
     for i, mode in enumerate(file.bending, start=1):
-        reader.add(f"bending.{i}", mode.table, _bending_columns(tanks), f"bending.{i}.")
+        reader.add(f"bending.{i}", mode.table, (*_bending_columns(tanks), *of_modes), f"bending.{i}.", (MOVED_MODE,))
     for tank in file.slosh:
         reader.add(f"slosh.{tank.name}", tank.table, SLOSH, f"slosh.{tank.name}.")
     outputs = [load.output for load in file.loads]
     if len(set(outputs)) < len(outputs):
         raise DataError("two loads have the same output name; rename one", file=toml, column="loads")
     for load in file.loads:
-        columns = load_columns(len(file.bending), tanks)
+        columns = dict.fromkeys((*load_columns(len(file.bending), tanks), *of_loads))
         if file.options.slosh_reaction:
             if load.forward_of_gimbal_m is None:
                 raise DataError(
@@ -160,9 +164,9 @@ def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehi
                     file=toml,
                     column=f"loads.{load.output}.forward_of_gimbal_m",
                 )
-            columns += REACTION_COLUMNS
-        unused = () if file.options.slosh_reaction else REACTION_COLUMNS
-        reader.add(f"loads.{load.output}", load.table, columns, f"loads.{load.output}.", unused)
+            columns |= dict.fromkeys(REACTION_COLUMNS)
+        unused = (*REACTION_COLUMNS, MOVED_LINE)
+        reader.add(f"loads.{load.output}", load.table, tuple(columns), f"loads.{load.output}.", unused)
     if file.options.local_angle_of_attack:
         _add_local(reader, file)
     for name, noise in file.noise.items():
@@ -202,6 +206,17 @@ def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehi
     )
     check_plausibility(vehicle)
     return vehicle
+
+
+def _with_noise_loads(file: VehicleFile, folder: Path, toml: Path) -> VehicleFile:
+    """Check what noises do to the loads; where the file leaves it open, take the form that its tables allow."""
+    check_noises(file, toml)
+    if "noise_loads" in file.options.model_fields_set or not any(needed_columns(file)):
+        return file
+    form, warning = form_of_tables(folder, toml, file)
+    if warning is not None:
+        warnings.warn(warning, stacklevel=3)
+    return file.model_copy(update={"options": file.options.model_copy(update={"noise_loads": form})})
 
 
 def _add_load_relief(reader: _Reader, file: VehicleFile) -> None:

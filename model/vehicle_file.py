@@ -12,6 +12,7 @@ from .folder_files import FileName
 from .toml_file import Name, NotNegative, Positive, Section, read_toml
 
 ExtraOutput = Literal["lateral_drift", "drift_rate", "dynamic_pressure_times_angle_of_attack", "load_components"]
+NoiseLoads = Literal["moved_line", "couple_forward", "couple_aft", "as_reported"]
 
 
 class TableEntry(Section):
@@ -181,6 +182,7 @@ class OptionsEntry(Section):
     full_coupling: bool = False
     local_angle_of_attack: bool = False
     slosh_reaction: bool = False
+    noise_loads: NoiseLoads = "moved_line"
     mean_response: Literal["linear", "nonlinear"] = "linear"
     extra_outputs: tuple[ExtraOutput, ...] = ()
 

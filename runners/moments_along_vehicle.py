@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ..model.errors import IntegrationError, UnknownNameError
 from ..model.load_components import component_columns
 from ..model.local_aerodynamics import local_load_columns
+from ..model.noise_loads import loading_noises, noise_load
 from ..model.station_loads import StationLoads, load_station_loads
 from .statistics import COMBINED, provenance
 from .time_nodes import interval_before, time_nodes
@@ -56,7 +57,7 @@ def moments_along_vehicle(
         raise UnknownNameError("vehicle of a system of one's own", study.system.name, [])
     loads = load_station_loads(study.vehicle)
     tanks = [tank.name for tank in study.vehicle.slosh]
-    names = list(component_columns(len(study.vehicle.bending), tanks))
+    names = list(component_columns(len(study.vehicle.bending), tanks, loading_noises(study.vehicle.file)))
     components = _with_components(study)
     if engine is None and options is None:
         engine = "covariance" if study.executable.shared_library is None else "sweep"
@@ -83,7 +84,12 @@ def moments_along_vehicle(
             "forward_of_gimbal": ("station", loads.forward_of_gimbal, {"units": "m"}),
             "source": found["source"].values,
         },
-        provenance(study) | {"engine": found.attrs["engine"], "slosh_reaction": str(slosh_reaction).lower()},
+        provenance(study)
+        | {
+            "engine": found.attrs["engine"],
+            "slosh_reaction": str(slosh_reaction).lower(),
+            "noise_loads": study.vehicle.file.options.noise_loads,
+        },
     )
     for name in dataset:
         dataset[name].attrs["units"] = "(N m)^2" if name == "variance" else "N m"
@@ -113,27 +119,36 @@ def station_rows(
     columns |= {f"slosh_displacement_{tank}": zero for tank in tanks}
     if not study.vehicle.file.options.local_angle_of_attack:
         columns |= {name: zero for name, _, _ in local_load_columns(len(study.vehicle.bending))}
+    at = [study.tables(float(time)) for time in times]
+    flight = {name: np.array([tables[name] for tables in at])[:, None] for name in at[0]}
     if slosh_reaction:
-        columns |= _with_reaction(columns, loads, tanks, [study.tables(float(time)) for time in times])
-    return np.stack([columns[c] for c in component_columns(len(study.vehicle.bending), tanks).values()], axis=2)
+        columns |= _with_reaction(columns, loads, tanks, flight)
+    file, area = study.vehicle.file, study.parameters["reference_area"].value
+    noises = loading_noises(file)
+    means = flight["mean.angle_of_attack"], flight["mean.engine_angle"]
+    for name, tables in noises.items():
+        columns[f"relative_deviation_{name}"] = noise_load(
+            tables, file.options.noise_loads, columns, flight, area, *means
+        )
+    wanted = component_columns(len(study.vehicle.bending), tanks, noises)
+    return np.stack([columns[c] for c in wanted.values()], axis=2)
 
 
 def _with_reaction(
-    columns: dict[str, NDArray[np.float64]], loads: StationLoads, tanks: list[str], at: list[dict[str, float]]
+    columns: dict[str, NDArray[np.float64]],
+    loads: StationLoads,
+    tanks: list[str],
+    flight: dict[str, NDArray[np.float64]],
 ) -> dict[str, NDArray[np.float64]]:
     """Return the slosh columns with the answer of the rigid body, as model/loads.py: slosh_reaction has it."""
-
-    def values(name: str) -> NDArray[np.float64]:
-        return np.array([tables[name] for tables in at])[:, None]
-
-    turning = columns["second_moment"] / values("moment_of_inertia")
-    sinking = columns["first_moment"] / values("mass")
+    turning = columns["second_moment"] / flight["moment_of_inertia"]
+    sinking = columns["first_moment"] / flight["mass"]
     found = {}
     for tank in tanks:
-        mass, point = values(f"slosh.{tank}.mass"), values(f"slosh.{tank}.attach_point")
-        inertia = mass * (sinking + (point - values("center_of_gravity")) * turning)
+        mass, point = flight[f"slosh.{tank}.mass"], flight[f"slosh.{tank}.attach_point"]
+        inertia = mass * (sinking + (point - flight["center_of_gravity"]) * turning)
         found[f"slosh_{tank}"] = columns[f"slosh_{tank}"] + inertia
         found[f"slosh_displacement_{tank}"] = (
-            values("axial_acceleration") * mass * ((point > loads.forward_of_gimbal) - turning)
+            flight["axial_acceleration"] * mass * ((point > loads.forward_of_gimbal) - turning)
         )
     return found

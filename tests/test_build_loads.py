@@ -79,11 +79,23 @@ def test_air_and_engine_moments_are_those_of_particles_from_either_side(vehicle,
     np.testing.assert_allclose(found.engine_angle, expected, atol=1e-10 * np.abs(expected).max())
 
 
+@pytest.mark.parametrize("side", [1, -1])
+def test_moved_normal_force_is_a_couple_at_every_particle(vehicle, side):
+    """Each force moved forward by a metre is the force and a couple as large: from either side, at every station."""
+    weights = vehicle.line.weights
+    masses, rotary = vehicle.mass * weights, vehicle.rotary_inertia * weights
+    air = vehicle.normal_force * weights
+    expected = particle_moments(vehicle, np.zeros_like(air), air, masses, rotary, side)
+    found = load_coefficients(vehicle, STATIONS).center_of_pressure
+    np.testing.assert_allclose(found, expected, atol=1e-10 * np.abs(expected).max())
+
+
 def test_moments_vanish_at_both_ends(vehicle):
     line = vehicle.line
     ends = load_coefficients(vehicle, line.edges[[0, -1]])
     size = load_coefficients(vehicle, STATIONS)
-    for name in ("angle_of_attack", "engine_angle", "bending", "attitude_rate", "bending_displacement", "bending_rate"):
+    names = ("angle_of_attack", "engine_angle", "center_of_pressure", "bending", "attitude_rate")
+    for name in (*names, "bending_displacement", "bending_rate"):
         scale = np.abs(getattr(size, name)).max()
         np.testing.assert_allclose(getattr(ends, name), 0.0, atol=1e-11 * scale, err_msg=name)
     assert ends.first_moment[0] == pytest.approx(line.total(vehicle.mass * (line.points - line.edges[0])), rel=1e-12)

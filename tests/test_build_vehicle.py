@@ -83,7 +83,7 @@ def test_forces_of_the_line_are_those_of_the_tables(built):
 def test_moments_vanish_at_both_ends_of_as504(built):
     numbers, _, _, _ = built
     for c in numbers.loads[::20]:
-        for name in ("angle_of_attack", "engine_angle", "bending"):
+        for name in ("angle_of_attack", "engine_angle", "center_of_pressure", "bending"):
             values = np.atleast_2d(getattr(c, name))
             assert np.abs(values[:, [0, -1]]).max() < 1e-9 * np.abs(values).max(), name
 

@@ -77,10 +77,20 @@ def folder(tmp_path_factory) -> Path:
     return made
 
 
-@pytest.mark.parametrize("options", [(), ("slosh_reaction", "local_angle_of_attack")])
-def test_every_station_is_the_moment_that_is_an_output_there(folder, options):
+@pytest.mark.parametrize(
+    ("options", "noise_loads"),
+    [
+        ((), "moved_line"),
+        (("slosh_reaction", "local_angle_of_attack"), "moved_line"),
+        (("slosh_reaction",), "couple_forward"),
+        ((), "couple_aft"),
+        ((), "as_reported"),
+    ],
+)
+def test_every_station_is_the_moment_that_is_an_output_there(folder, options, noise_loads):
     """Sources, means and times alike: the congruence of one run is the run of each moment."""
-    study = Study.load(folder, changes={f"options.{name}": True for name in options})
+    changes = {f"options.{name}": True for name in options} | {"options.noise_loads": noise_loads}
+    study = Study.load(folder, changes=changes)
     tight = SweepOptions(relative_tolerance=1e-10)
     along = moments_along_vehicle(study, TIMES, slosh_reaction="slosh_reaction" in options, options=tight)
     direct = study.response_statistics(TIMES, responses=list(STATIONS), options=tight)

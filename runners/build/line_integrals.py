@@ -55,6 +55,11 @@ class Line:
         share = (self.points - x[left]) / (x[left + 1] - x[left])
         return values[..., left] * (1 - share) + values[..., left + 1] * share
 
+    def slope(self, x: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the slope at the points, (..., 2 m), of what ``linear`` gives."""
+        left = np.clip(np.searchsorted(x, self.points) - 1, 0, x.size - 2)
+        return (np.diff(values) / np.diff(x))[..., left]
+
     def total(self, density: NDArray[np.float64]) -> NDArray[np.float64]:
         """Integrate (..., 2 m) over the whole line."""
         return density @ self.weights

@@ -10,7 +10,8 @@ on the free vehicle makes the moment
 because the vehicle answers with the accelerations F/m and M/I; mu is the mass per length with all liquid frozen, r the
 rotary inertia per length. At either end L vanishes whatever f is. Coefficients of 4-13: M'_alpha = L[q A c'_N],
 M'_beta = L of the control thrust at the gimbal plane, M'_eta = -int (x - s) mu Y + r Y' dx (modes are orthogonal to
-rigid motion: nothing answers), M'_xi = -m_k (X_S - s) forward of s.
+rigid motion: nothing answers), M'_xi = -m_k (X_S - s) forward of s. The normal force moved forward as a whole by a
+metre gives dM'_alpha/dX_CP = L[-q A dc'_N/dx] = N(s) - S_2 / I N, by parts, N(s) being what acts forward of s.
 """
 
 from __future__ import annotations
@@ -69,10 +70,12 @@ class LoadCoefficients:
     ----------
     angle_of_attack, engine_angle : (s,) arrays
         N m/rad.
+    center_of_pressure : (s,) array
+        Change of ``angle_of_attack`` for each metre that the normal force moves forward as a whole, N/rad.
     bending, slosh : (modes, s) and (tanks, s) arrays
         N s2.
     first_moment, second_moment : (s,) arrays
-        S_1 (kg m) and S_2 (kg m2), by which the rigid body answers slosh forces.
+        S_1 (kg m) and S_2 (kg m2), by which the rigid body answers forces and couples.
     attitude_rate : (s,) array
         N m s/rad; this and the next two by the local angle of attack.
     bending_displacement, bending_rate : (modes, s) arrays
@@ -81,6 +84,7 @@ class LoadCoefficients:
 
     angle_of_attack: NDArray[np.float64]
     engine_angle: NDArray[np.float64]
+    center_of_pressure: NDArray[np.float64]
     bending: NDArray[np.float64]
     slosh: NDArray[np.float64]
     first_moment: NDArray[np.float64]
@@ -122,6 +126,7 @@ def load_coefficients(vehicle: LoadedVehicle, stations: NDArray[np.float64]) -> 
     return LoadCoefficients(
         angle_of_attack=free(air),
         engine_angle=engine,
+        center_of_pressure=line.forward(air, stations) - second * line.total(air) / inertia,
         bending=-moment_about_station(mu * vehicle.displacement, r * vehicle.rotation),
         slosh=-vehicle.slosh_mass[:, None] * ahead,
         first_moment=first,
@@ -155,6 +160,7 @@ def load_columns(coefficients: LoadCoefficients, tanks: Sequence[str]) -> dict[t
         **{(f"slosh_{tank}", "N s2"): row for tank, row in zip(tanks, c.slosh, strict=True)},
         ("first_moment", "kg m"): c.first_moment,
         ("second_moment", "kg m2"): c.second_moment,
+        ("center_of_pressure", "N/rad"): c.center_of_pressure,
     }
 
 

@@ -116,6 +116,7 @@ def _bending(numbers: VehicleNumbers, mode: int) -> Columns:
 
     points = {tank: found.attach_point for tank, found in numbers.slosh.items()}
     force = numbers.line.total(numbers.intensity * numbers.displacement[:, mode])
+    moved = numbers.line.total(numbers.intensity * numbers.line.slope(modes.x, shapes[0]))
     return {
         ("frequency", "rad/s"): modes.frequency[:, mode],
         ("generalized_mass", "kg"): modes.generalized_mass[:, mode],
@@ -123,6 +124,7 @@ def _bending(numbers: VehicleNumbers, mode: int) -> Columns:
         ("slope_at_gimbal", "1/m"): at(0.0, 1),
         ("slope_at_sensor", "1/m"): at(sensor, 1),
         ("normal_force_slope_times_displacement", "1/rad"): force,
+        ("normal_force_slope_times_slope", "1/m/rad"): moved,
         **{(f"displacement_at_{tank}", "1"): at(x, 0) for tank, x in points.items()},
         **{(f"slope_at_{tank}", "1/m"): at(x, 1) for tank, x in points.items()},
     }
