@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from ..errors import DataError, UnknownNameError
+from .consistency import refuse_misplaced, refuse_repetitions
 from .flight import AtmosphereFactors, Drag, EngineGroup, NormalForceComponent, PitchProgramme, Site
 from .structure import LumpedMass, Stiffness, Tank
 from .tank_shape import TankShape
@@ -67,6 +68,8 @@ class Construction:
     slosh_method: Literal["surface_radius", "cylinder", "potential"] = "surface_radius"
 
     def __post_init__(self):
+        refuse_misplaced(self)
+        refuse_repetitions(self)
         for mass in self.masses:
             mass.require_within(self.aft_end, self.forward_end)
         for tank in self.tanks:

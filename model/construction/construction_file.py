@@ -14,6 +14,7 @@ from ..csv_table import CsvTable, Order, read_csv_table
 from ..errors import DataError
 from ..folder_files import file_inside
 from ..toml_file import read_toml
+from .consistency import check_sizes
 from .construction import Construction
 from .construction_entries import (
     ConstructionFile,
@@ -65,13 +66,14 @@ def load_construction(folder: Path, changes: Mapping[str, Any] | None = None) ->
     atmosphere = None if entry.atmosphere is None else _atmosphere(file_inside(folder, entry.atmosphere.file))
     engines = tuple(_engine(folder, e) for e in entry.engines)
     normal_force = tuple(_normal_force(folder, e) for e in entry.normal_force)
-    pitch = _pitch(file_inside(folder, entry.pitch.file), entry.pitch)
+    with _located(toml):
+        pitch = _pitch(file_inside(folder, entry.pitch.file), entry.pitch)
     tanks = []
     for tank in entry.tanks:
         with _located(toml, f"tanks.{tank.name}"):
             tanks.append(_tank(tank))
     with _located(toml):
-        return Construction(
+        construction = Construction(
             name=entry.name,
             gimbal_station=entry.gimbal_station_m,
             sensor_station=entry.sensor_station_m,
@@ -92,6 +94,8 @@ def load_construction(folder: Path, changes: Mapping[str, Any] | None = None) ->
             end_time=entry.end_time_s,
             slosh_method=entry.slosh_method,
         )
+    check_sizes(construction, toml)
+    return construction
 
 
 def construction_files(folder: Path) -> tuple[Path, ...]:
@@ -111,7 +115,7 @@ def _located(file: Path, column: str | None = None, row: int | None = None) -> I
     except DataError as error:
         if error.file is not None:
             raise
-        raise DataError(error.why, file=file, column=column, row=row) from None
+        raise DataError(error.why, file=file, column=column or error.column, row=row) from None
 
 
 def _read(
@@ -140,7 +144,15 @@ def _masses(file: Path, aft_end: float, forward_end: float) -> tuple[LumpedMass,
         strict=True,
     )
     masses = []
+    lines: dict[str, int] = {}
     for line, (item, begin, end, mass, radius) in zip(table.lines, columns, strict=True):
+        if lines.setdefault(item, line) != line:
+            raise DataError(
+                f"'{item}' stands in line {lines[item]} already; remove or rename one",
+                file=file,
+                column="item",
+                row=line,
+            )
         with _located(file, row=line):
             masses.append(LumpedMass(item, float(begin), float(end), float(mass), float(radius)))
             masses[-1].require_within(aft_end, forward_end)
@@ -220,6 +232,13 @@ def _pitch(file: Path, entry: PitchEntry) -> PitchProgramme:
     else:
         table = _read(file, "time", "s")
         time, angle = table.columns["time"], np.radians(table.column("pitch", "deg"))
+    last = float(segments[-1, 1] if entry.kind == "polynomials" else time[-1])
+    if entry.arrest_s is not None and entry.arrest_s > last + 1e-9:
+        raise DataError(
+            f"is {entry.arrest_s:g} s, but the programme in {file.name} ends at {last:g} s and is held; extend it "
+            "or arrest earlier",
+            column="pitch.arrest_s",
+        )
     arrest = math.inf if entry.arrest_s is None else entry.arrest_s
     return PitchProgramme(entry.kind, entry.time_base_s, entry.begin_s, arrest, segments, time, angle)
 

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import logging
+import warnings
 from collections.abc import Iterable, Mapping
 
 from ...model.construction import Construction
 from ...model.construction.atmosphere import TOP
 from ...model.construction.flight import EngineGroup
-from ...model.errors import DataError
+from ...model.errors import DataError, ExtrapolationWarning
 from .ascent_integration import Ascent, Leg
 
 log = logging.getLogger(__name__)
 _STANDARD_GRAVITY = 9.80665  # m/s2
+LEAST_HELD, MOST_HELD = 0.002, 0.05  # of the burn, by which engines outrun their table
 _GROUND_TOLERANCE = 1e-3  # m, of the altitude at release
 
 
@@ -55,6 +57,27 @@ def check_lift_off(construction: Construction, observed: Mapping[str, float]) ->
             f"the thrust of {observed['thrust']:g} N does not lift {observed['mass']:g} kg; check masses and engines",
             time=construction.site.release,
         )
+
+
+def check_held(group: EngineGroup, begin: float, end: float) -> None:
+    """Warn of engines that burn beyond the rows of their thrust and flow, and refuse more than ``MOST_HELD``.
+
+    Raises
+    ------
+    DataError
+    """
+    first, last = float(group.time[0]), float(group.time[-1])
+    before, after = max(first - begin, 0.0), max(end - last, 0.0)
+    share = (before + after) / (end - begin)
+    if share <= LEAST_HELD:
+        return
+    why = (
+        f"engines '{group.name}' burn from {begin:g} to {end:g} s, but their thrust and flow are given from {first:g} "
+        f"to {last:g} s and held for {before + after:.4g} s; extend the table, or give cutoff_s"
+    )
+    if share > MOST_HELD:
+        raise DataError(why, time=last if after else begin)
+    warnings.warn(why, ExtrapolationWarning, stacklevel=3)
 
 
 def check_leg(ascent: Ascent, leg: Leg) -> None:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...model.construction import Construction
 from .ascent_integration import Ascent, Leg
-from .ascent_limits import check_leg, check_lift_off, first_depletion
+from .ascent_limits import check_held, check_leg, check_lift_off, first_depletion
 from .ascent_pieces import piece_edges
 
 Array = NDArray[np.float64]
@@ -98,6 +98,9 @@ def fly(construction: Construction, spacing: float = 1.0) -> MeanFlight:
     edges = _edges(construction, [*grid, *cutoffs])
     legs, cut = _legs(ascent, edges)
     end = legs[-1].end
+    stops = {group.name: time for group, time in cut}
+    for group in construction.engines:
+        check_held(group, release, stops.get(group.name, end))
     events = {"release": release, **_programme_events(construction, end), **_found_events(ascent, legs)}
     events.update((group.cutoff_event, time) for group, time in cut)
     jumps = [time for _, time in cut]
