@@ -120,7 +120,7 @@ SIZES = {
     "liquid in t": (TOML, "liquid_kg = 14885.0", "liquid_kg = 14.885", PlausibilityWarning, "of what the tank holds"),
     "altitude in km": (TOML, "altitude_m = 10.0", "altitude_m = 16000.0", PlausibilityWarning, "no flight begins"),
     "shear in kN": ("construction/stiffness.csv", ",250000000,", ",2500,", PlausibilityWarning, "thin wall of"),
-    "arrest": (TOML, 'kind = "gravity_turn" ', 'kind = "table"\narrest_s = 30.0 ', DataError, "ends at 20 s and is held"),
+    "arrest": (TOML, 'kind = "gravity_turn" ', 'kind = "table"\narrest_s = 30.0 ', DataError, "ends at 20 s"),
 }  # fmt: skip
 
 
