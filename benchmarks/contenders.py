@@ -12,7 +12,7 @@ from ascentwind.codegen.functions import state_scales
 from ascentwind.runners import EnsembleOptions, IntegratorOptions, Study
 from ascentwind.runners.covariance import covariance_equation
 from ascentwind.runners.engines import ENGINES
-from ascentwind.runners.integration import intervals
+from ascentwind.runners.time_nodes import intervals
 from numpy_ensembles import Scheme, ensemble, euler_maruyama, fourth_order
 from scipy.integrate import solve_ivp
 
@@ -76,10 +76,10 @@ class Adjoint:
 
     def std(self, time: float, integrate: Callable[[np.ndarray, float], np.ndarray]) -> np.ndarray:
         """Run back from ``time``; ``integrate`` takes the state over pseudo-time 0 to 1 and gives it at 1."""
-        last = intervals(self.system, self.system.start, time)[-1]
+        last = intervals(self.executable, self.system.start, time)[-1]
         C = self.executable.matrices(time, last.low, last.high)["C"]
         y = np.concatenate([(self.scale[:, None] * C.T / self.outputs).ravel("F"), np.zeros(self._quad.size)])
-        for piece in reversed(intervals(self.system, self.system.start, time)):
+        for piece in reversed(intervals(self.executable, self.system.start, time)):
             span = piece.end - piece.begin
             self._p[:] = self.executable.integrator_parameters(piece.end, span, piece.low, piece.high)
             y = integrate(y, span)

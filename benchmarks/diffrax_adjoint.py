@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from ascentwind.codegen.evaluation import MatrixEvaluator
 from ascentwind.runners import Study
-from ascentwind.runners.integration import intervals
+from ascentwind.runners.time_nodes import intervals
 
 jax.config.update("jax_enable_x64", True)
 SPACING = 0.05  # s; a kink of a table is smeared over this much
@@ -25,7 +25,7 @@ def diffrax_adjoints(study: Study, tolerance: float) -> Callable[[np.ndarray], n
     covariances = [system.start_covariance_matrix(name, executable.parameters) for name in system.sources]
     evaluate = MatrixEvaluator(executable, ("A", "B"))
     tables = []
-    for piece in intervals(system, system.start, system.end):
+    for piece in intervals(executable, system.start, system.end):
         count = int(np.ceil((piece.end - piece.begin) / SPACING))
         spacing = (piece.end - piece.begin) / count
         at = piece.begin + spacing * (np.arange(count)[:, None] + THIRDS)
@@ -56,7 +56,7 @@ def diffrax_adjoints(study: Study, tolerance: float) -> Callable[[np.ndarray], n
         return jax.tree.map(lambda a: a[-1], solution.ys)
 
     def std(time: float) -> np.ndarray:
-        last = intervals(system, system.start, time)[-1]
+        last = intervals(executable, system.start, time)[-1]
         C = executable.matrices(time, last.low, last.high)["C"]
         adjoint, variance = jnp.asarray(C.T / outputs), jnp.zeros((len(outputs), len(columns)))
         for piece, coefficients, spacing in reversed(tables):

@@ -18,7 +18,7 @@ import numpy as np
 from ascentwind.codegen.evaluation import MatrixEvaluator
 from ascentwind.runners import Study
 from ascentwind.runners.covariance import covariance_equation
-from ascentwind.runners.integration import intervals
+from ascentwind.runners.time_nodes import intervals
 
 Formula = Callable[[np.ndarray, np.ndarray, float], tuple[np.ndarray, np.ndarray]]
 
@@ -103,7 +103,7 @@ def _flight(
     matrices, outputs = MatrixEvaluator(executable, ("A", "B")), MatrixEvaluator(executable, ("C",))
 
     def steps(begin: float, end: float) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        for piece in intervals(system, begin, end):
+        for piece in intervals(executable, begin, end):
             count = max(1, int(np.ceil((piece.end - piece.begin) / scheme.step - 1e-9)))
             h = (piece.end - piece.begin) / count
             for k in range(count):
@@ -111,7 +111,7 @@ def _flight(
                 yield scheme.formula(A, B, h)
 
     for time in times.tolist():
-        last = intervals(system, system.start, time)[-1]
+        last = intervals(executable, system.start, time)[-1]
         (C,) = outputs(time, last.low, last.high)
         yield time, C, steps(begin, time)
         begin = time

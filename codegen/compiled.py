@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ..model.errors import AscentwindWarning
 from ..model.system import LinearSystem
 from ..model.tables import TableGroup, run_time_vector, table_values
+from ..model.time_conditions import Stops
 from .cache import CacheError, CompiledLibrary, compiled_library, set_aside
 from .compiler import find_compiler
 from .functions import MATRICES, CoreFunctions, SystemFunctions, core_functions, interpreted_functions
@@ -55,6 +56,10 @@ class ExecutableSystem:
     def tables(self) -> NDArray[np.float64]:
         """The run-time vector that compiled code reads by address; lives as long as this object."""
         return run_time_vector(self.groups) if self.groups else np.zeros(1)
+
+    def stops(self, until: float) -> Stops:
+        """Return where integrators stop up to ``until`` (s) for the parameters in force."""
+        return self.system.stops(self.parameters, until)
 
     @property
     def engine(self) -> str:

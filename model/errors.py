@@ -63,6 +63,10 @@ class NonlinearSystemError(SystemDefinitionError):
     """An expression given for a linear system is not linear in its states and inputs."""
 
 
+class SwitchError(AscentwindError):
+    """A condition on time in the equations cannot be located, or not be differentiated where it switches."""
+
+
 class SingularCouplingError(AscentwindError):
     """The mass matrix that couples bending and slosh cannot be inverted."""
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import casadi as ca
 import numpy as np
@@ -29,6 +29,7 @@ from .system_checks import (
     scalar_symbol,
 )
 from .tables import TableGroup
+from .time_conditions import Condition, Stops, find_conditions, locate
 
 
 @dataclass(frozen=True)
@@ -90,7 +91,8 @@ class LinearSystem:
     start_covariance : mapping of source to (n, n) SX or array
         Covariance P0 of the states at the start that a source brings; a function of p. Missing means zero.
     discontinuities : tuple of float
-        Times at which a table or a matrix jumps, s; integrators stop there. They are put in order, each once.
+        Times at which a table or a matrix jumps, s; integrators stop there. They are put in order, each once. A
+        condition on time in the expressions needs no declaration: it is located (:meth:`stops`).
     start, end : float
         Times between which the system is defined, s.
     coupling_matrix : SX, optional
@@ -107,6 +109,8 @@ class LinearSystem:
         If an expression is not linear in x, w, u, or depends on a symbol that was not declared.
     UnknownNameError
         A start covariance for a source that is not there.
+    SwitchError
+        If a condition (a comparison, floor, sign, ...) depends on a table.
     """
 
     name: str
@@ -185,6 +189,7 @@ class LinearSystem:
                         f"system '{self.name}': the {what} '{label}' is not linear in states, noises and inputs; "
                         "linearise it about the mean flight"
                     )
+        _ = self.conditions
 
     @property
     def state_names(self) -> tuple[str, ...]:
@@ -236,6 +241,32 @@ class LinearSystem:
                         "variance is infinite; colour the noise (white = false with a correlation time) or leave the "
                         "response out"
                     )
+
+    @cached_property
+    def conditions(self) -> tuple[Condition, ...]:
+        """Conditions on time in the expressions: comparisons, floor, sign, fmod, ... of time and parameters."""
+        signals = ca.vertcat(self.x, self.w, self.u)
+        expressions = (self.derivative, self.output, self.input_values)
+        return find_conditions(expressions, self.time, self.p, self.v, signals, self.name)
+
+    def stops(self, parameters: np.ndarray, until: float) -> Stops:
+        """Return where integrators stop for given parameters: declared discontinuities and located switches.
+
+        Parameters
+        ----------
+        parameters : (n_p,) array
+        until : float
+            s; those beyond it may be among them.
+
+        Raises
+        ------
+        SwitchError
+            If a condition cannot be located; it says which and why.
+        """
+        end = self.end
+        if not np.isfinite(end):  # doubled, so that few searches serve all end times
+            end = self.start + 2.0 ** np.ceil(np.log2(max(until - self.start, 1.0)))
+        return _located(self, np.asarray(parameters, float).tobytes() if self.conditions else b"", float(end))
 
     @cached_property
     def A(self) -> ca.SX:
@@ -290,6 +321,11 @@ class LinearSystem:
         return found
 
 
+@lru_cache(maxsize=64)
+def _located(system: LinearSystem, parameters: bytes, end: float) -> Stops:
+    return locate(system.conditions, system.discontinuities, np.frombuffer(parameters), system.start, end, system.name)
+
+
 def define_system(
     name: str,
     *,
@@ -329,7 +365,7 @@ def define_system(
     start, end : float
         Seconds.
     discontinuities : sequence of float
-        Times at which the equations jump, s, in any order.
+        Times at which the equations jump, s, in any order; conditions on time in the expressions are located without.
 
     Returns
     -------

@@ -69,6 +69,7 @@ class AdjointSolver:
     def __init__(self, executable: ExecutableSystem, options: IntegratorOptions):
         self._executable, self._options = executable, options
         self._integrator = Integrator(executable.functions.adjoint, options)
+        self._longest = options.longest_interval
         system = executable.system
         self._state_scale = state_scales(system)
         self._output_scale = np.array([o.scale for o in system.outputs])
@@ -77,7 +78,7 @@ class AdjointSolver:
 
     def _terminal(self, time: float) -> tuple[NDArray, NDArray, NDArray]:
         """Return scaled adjoints at t2, G and the known inputs there."""
-        last = interval_before(self._executable.system, time)
+        last = interval_before(self._executable, time)
         matrices = self._executable.matrices(time, last.low, last.high)
         scaled = self._state_scale[:, None] * matrices["C"].T / self._output_scale
         return scaled, matrices["G"], matrices["inputs"][:, 0]
@@ -90,7 +91,7 @@ class AdjointSolver:
         IntegrationError, StepBudgetError
         """
         s, system = len(self._executable.system.sources), self._executable.system
-        node = float(time_nodes(system, [time])[0])
+        node = float(time_nodes(self._executable, [time])[0])
         scaled, G, inputs = self._terminal(node)
         scaled, quadratures, counters = self._backward(scaled, node, system.start)
         adjoint = scaled / self._state_scale[:, None] * self._output_scale
@@ -109,7 +110,7 @@ class AdjointSolver:
         """Return scaled adjoints (n, responses) at ``earliest``, quadratures and counters."""
         system, counters = self._executable.system, Counters()
         quadratures = np.zeros((len(system.outputs), len(system.sources) + 1))
-        for interval in reversed(intervals(system, earliest, time)):
+        for interval in reversed(intervals(self._executable, earliest, time, self._longest)):
             parameters = self._executable.integrator_parameters(
                 interval.end, interval.end - interval.begin, interval.low, interval.high
             )
@@ -126,10 +127,10 @@ class AdjointSolver:
     def history(self, time: float, spacing: float) -> AdjointHistory:
         """Return adjoint and weighting functions at points at most ``spacing`` seconds apart."""
         system = self._executable.system
-        (time,) = time_nodes(system, [time]).tolist()
+        (time,) = time_nodes(self._executable, [time]).tolist()
         scaled, G, _ = self._terminal(time)
         times, adjoints, noise, inputs = [], [], [], []  # latest first
-        for interval in reversed(intervals(system, system.start, time)):
+        for interval in reversed(intervals(self._executable, system.start, time)):
             span = interval.end - interval.begin
             points = max(1, int(np.ceil(span / spacing - 1e-9)))
             parameters = self._executable.integrator_parameters(interval.end, span, interval.low, interval.high)

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from ..model.system import LinearSystem
+from ..codegen.compiled import ExecutableSystem
 from ..model.tables import TableGroup
 from .time_nodes import intervals, time_nodes
 
@@ -52,19 +52,17 @@ class Grid:
         return self.steps[:, None] * WEIGHTS
 
 
-def collocation_grid(
-    system: LinearSystem, groups: Sequence[TableGroup], times: Sequence[float], step: float = STEP
-) -> Grid:
+def collocation_grid(executable: ExecutableSystem, times: Sequence[float], step: float = STEP) -> Grid:
     """Return a grid to the last of the end times, all of which are edges of it.
 
     Steps end on discontinuities and table knots and are short beside the former and the end times. Tables are cubic
     between knots and less smooth across them; a step that held a knot would lose its order.
     """
-    nodes = time_nodes(system, np.sort(times))
-    begin, end = system.start, float(nodes[-1])
-    ends = sorted({begin, *(i.end for i in intervals(system, begin, end)), *nodes.tolist()})
+    nodes = time_nodes(executable, np.sort(times))
+    begin, end = executable.system.start, float(nodes[-1])
+    ends = sorted({begin, *(i.end for i in intervals(executable, begin, end)), *nodes.tolist()})
     edges = [np.array([begin])]
-    knots = _knot_times(groups, begin, end, step)
+    knots = _knot_times(executable.groups, begin, end, step)
     for low, high in pairwise(ends):
         breaks = np.concatenate([[low], knots[(knots > low + FIRST_STEP) & (knots < high - FIRST_STEP)], [high]])
         marks = _steps_from_edge(breaks, low, high, step)

@@ -31,9 +31,12 @@ class CovarianceOptions:
     ----------
     relative_tolerance : float
         Of every covariance, between 1e-13 and 1e-2.
+    longest_interval : float
+        Intervals between discontinuities are divided so that none is longer, s.
     """
 
     relative_tolerance: float = 1e-9
+    longest_interval: float = float("inf")
 
     def __post_init__(self):
         if not 1e-13 <= self.relative_tolerance <= 1e-2:
@@ -61,6 +64,7 @@ def covariance_equation(
     times: Sequence[float],
     relative_tolerance: float = 1e-9,
     progress: Callable[[float], None] | None = None,
+    longest_interval: float = float("inf"),
 ) -> CovarianceResult:
     """Integrate covariances of all sources and the mean with SciPy's DOP853.
 
@@ -75,6 +79,8 @@ def covariance_equation(
         covariances many orders smaller than the wind's.
     progress : callable, optional
         Called with each time when it is reached.
+    longest_interval : float
+        Intervals between discontinuities are divided so that none is longer, s.
 
     Raises
     ------
@@ -95,9 +101,9 @@ def covariance_equation(
     y = np.concatenate([np.array(start).ravel(), np.zeros(n)])
     covariances, means = [], []
     begin = system.start
-    check_explicit_steps(executable, intervals(system, begin, float(max(times))), MOST_STEPS)
-    for time, node in zip(times, time_nodes(system, times).tolist(), strict=True):
-        for interval in intervals(system, begin, node) if node > begin else []:
+    check_explicit_steps(executable, intervals(executable, begin, float(max(times))), MOST_STEPS)
+    for time, node in zip(times, time_nodes(executable, times).tolist(), strict=True):
+        for interval in intervals(executable, begin, node, longest_interval) if node > begin else []:
 
             def rate(t: float, y: NDArray, low: float = interval.low, high: float = interval.high) -> NDArray:
                 A, B, E, inputs = matrices(t, low, high)
@@ -118,7 +124,7 @@ def covariance_equation(
                     f"{solution.message}"
                 )
             y = solution.y[:, -1]
-        begin, last = node, interval_before(system, node)
+        begin, last = node, interval_before(executable, node)
         C, G, inputs = outputs(begin, last.low, last.high)
         C = C * scale
         covariances.append(C @ y[:-n].reshape(len(sources), n, n) @ C.T)

@@ -85,11 +85,11 @@ def discretise(executable: ExecutableSystem, times: Sequence[float], substep: fl
     rates = MatrixEvaluator(executable, ("A", "B", "E", "inputs"))
     outputs = MatrixEvaluator(executable, ("C", "G", "inputs"))
     columns = [system.noise_columns(source) for source in system.sources]
-    nodes = time_nodes(system, times).tolist()
+    nodes = time_nodes(executable, times).tolist()
     pieces = [
         (number, interval)
         for number, (begin, end) in enumerate(pairwise([system.start, *nodes]))
-        for interval in (intervals(system, begin, end) if end > begin else [])
+        for interval in (intervals(executable, begin, end) if end > begin else [])
     ]
     substeps = _substeps(rates, [interval for _, interval in pieces], scale, columns, substep)
     transition = np.tile(np.eye(n), (len(times), 1, 1))
@@ -106,7 +106,7 @@ def discretise(executable: ExecutableSystem, times: Sequence[float], substep: fl
                 "bound there or a table holds an impossible value (see 'ascentwind inspect')"
             )
         state = Phi @ state + b
-        last = interval_before(system, time)
+        last = interval_before(executable, time)
         y, G, inputs = outputs(time, last.low, last.high)
         C.append(y * scale)
         mean.append(C[-1] @ state + G @ inputs[:, 0])
@@ -120,7 +120,7 @@ def discretise(executable: ExecutableSystem, times: Sequence[float], substep: fl
 def _balanced_scales(executable: ExecutableSystem) -> NDArray[np.float64]:
     """Return scales of the states that make the state matrix small, so that exponentials need few squarings."""
     system, scale = executable.system, state_scales(executable.system)
-    first = intervals(system, system.start, min(system.end, system.start + 100.0))[0]
+    first = intervals(executable, system.start, min(system.end, system.start + 100.0))[0]
     (A,) = MatrixEvaluator(executable, ("A",))(0.5 * (first.begin + first.end), first.low, first.high)
     _, (balance, _) = matrix_balance(A * scale / scale[:, None], permute=False, separate=True)
     return scale * balance

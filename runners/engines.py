@@ -14,12 +14,13 @@ from .covariance import CovarianceOptions, covariance_equation
 from .ensemble import EnsembleOptions, ensemble_dataset
 from .integration import IntegratorOptions
 from .statistics import COMBINED, ResponseStatistics, provenance, response_dataset, statistics_dataset
-from .sweep_engine import SweepOptions, SweepResult, sweep, sweep_of
+from .sweep_engine import LEAST_TOLERANCE, SweepOptions, SweepResult, sweep, sweep_of
 from .time_nodes import time_nodes
 
 if TYPE_CHECKING:
     from .study import Study
 
+LOOKS = 1024  # pieces of flight in which a check begins anew
 Progress = Callable[[float], None]
 
 
@@ -36,7 +37,7 @@ class Engine:
     compute : callable
         (study, increasing end times, responses, options, progress) -> ResponseStatistics.
     finer : callable
-        Options of a finer discretisation, by which the error of the given ones is judged.
+        (options, flight in s) -> options of a finer discretisation, by which the error of the given ones is judged.
     tight : object or None
         Options with which engines are held against each other; None for an engine with a sampling error.
     """
@@ -44,7 +45,7 @@ class Engine:
     label: str
     options: type
     compute: Callable[[Study, list[float], list[str], Any, Progress | None], ResponseStatistics]
-    finer: Callable[[Any], Any]
+    finer: Callable[[Any, float], Any]
     tight: object | None
 
 
@@ -113,7 +114,7 @@ def compute_statistics(
         )
     found = chosen.compute(study, times, responses, settings, progress)
     if check:
-        finer = chosen.compute(study, times, responses, chosen.finer(settings), None)
+        finer = chosen.compute(study, times, responses, chosen.finer(settings, times[-1] - study.system.start), None)
         found["discretisation_difference"] = (
             found.std.dims,
             relative_difference(found.std.values, finer.std.values),
@@ -134,7 +135,7 @@ def _cvodes(
 ) -> ResponseStatistics:
     solver = AdjointSolver(study.with_means, options)
     runs = []
-    for time, node in zip(times, time_nodes(study.system, times).tolist(), strict=True):
+    for time, node in zip(times, time_nodes(study.executable, times).tolist(), strict=True):
         runs.append(replace(solver.run(node), time=time))
         if progress:
             progress(time)
@@ -145,7 +146,14 @@ def _sweep(
     study: Study, times: list[float], responses: list[str], options: SweepOptions, progress: Progress | None
 ) -> ResponseStatistics:
     engine = sweep_of(study.system)
-    found = sweep(engine, study.with_means, times, relative_tolerance=options.relative_tolerance, responses=responses)
+    found = sweep(
+        engine,
+        study.with_means,
+        times,
+        relative_tolerance=options.relative_tolerance,
+        longest_interval=options.longest_interval,
+        responses=responses,
+    )
     if progress:
         for time in times:
             progress(time)
@@ -201,7 +209,7 @@ def _covariance(
     study: Study, times: list[float], responses: list[str], options: CovarianceOptions, progress: Progress | None
 ) -> ResponseStatistics:
     rows = [study.system.output_index(name) for name in responses]
-    found = covariance_equation(study.with_means, times, options.relative_tolerance, progress)
+    found = covariance_equation(study.with_means, times, options.relative_tolerance, progress, options.longest_interval)
     attributes = provenance(study) | {"engine": "covariance", "relative_tolerance": options.relative_tolerance}
     dataset = statistics_dataset(study, times, responses, found.mean[:, rows], found.variance[:, rows], attributes)
     return _with_covariance(dataset, found.covariance, rows)
@@ -216,21 +224,28 @@ def _ensemble(
     return found
 
 
-def _tenth(options: Any) -> Any:
-    return replace(options, relative_tolerance=max(1e-13, 0.1 * options.relative_tolerance))
+def _finer(options: Any, flight: float) -> Any:
+    """Return a tenth of the tolerance, and looks at flight so often that no step passes over what the first missed."""
+    tolerance = max(LEAST_TOLERANCE, 0.1 * options.relative_tolerance)
+    longest = min(options.longest_interval, flight / LOOKS) if flight > 0 else options.longest_interval
+    return replace(options, relative_tolerance=tolerance, longest_interval=longest)
+
+
+def _finer_ensemble(options: EnsembleOptions, flight: float) -> EnsembleOptions:
+    return replace(options, substep=min(0.5 * options.substep, flight / LOOKS) if flight > 0 else options.substep)
 
 
 ENGINES = {
-    "sweep": Engine("sweep", SweepOptions, _sweep, _tenth, SweepOptions(relative_tolerance=1e-9)),
+    "sweep": Engine("sweep", SweepOptions, _sweep, _finer, SweepOptions(relative_tolerance=1e-9)),
     "cvodes": Engine(
-        "adjoint (CVODES)", IntegratorOptions, _cvodes, _tenth, IntegratorOptions(relative_tolerance=1e-9)
+        "adjoint (CVODES)", IntegratorOptions, _cvodes, _finer, IntegratorOptions(relative_tolerance=1e-9)
     ),
     "covariance": Engine(
         "covariance equation (SciPy)",
         CovarianceOptions,
         _covariance,
-        _tenth,
+        _finer,
         CovarianceOptions(relative_tolerance=1e-9),
     ),
-    "ensemble": Engine("ensemble", EnsembleOptions, _ensemble, lambda o: replace(o, substep=0.5 * o.substep), None),
+    "ensemble": Engine("ensemble", EnsembleOptions, _ensemble, _finer_ensemble, None),
 }

@@ -69,7 +69,7 @@ class FlightNodes:
             time = 0.5 * (system.start + max(times))
             with naming_fastest_root(executable):
                 raise StepBudgetError(MOST_STEPS, f"t = {time:.6g} s", time=time)
-        grid = collocation_grid(system, executable.groups, times, step)
+        grid = collocation_grid(executable, times, step)
         nodes = grid.nodes.ravel()
         tables = tables_at(executable.groups, nodes)
         matrices = functions.matrices(nodes, tables, numbers)

@@ -36,12 +36,15 @@ class IntegratorOptions:
         quantities scaled to be of the order of one.
     max_steps : int
         Of one run from end to start; AS-504 takes 20,000 at a tolerance of 1e-9.
+    longest_interval : float
+        Intervals between discontinuities are divided so that none is longer, s; the solver begins anew in each.
     """
 
     method: Method = "adams"
     iteration: Iteration = "newton"
     relative_tolerance: float = 1e-7
     max_steps: int = 200_000
+    longest_interval: float = float("inf")
 
     def __post_init__(self):
         if self.method not in ("adams", "bdf"):

@@ -113,7 +113,7 @@ def station_rows(
     """Return K, the coefficient of each component at each station, (times, stations, components)."""
     assert study.vehicle is not None
     tanks = [tank.name for tank in study.vehicle.slosh]
-    times = np.array([interval_before(study.system, node).high for node in time_nodes(study.system, times)])
+    times = np.array([interval_before(study.executable, node).high for node in time_nodes(study.executable, times)])
     columns = loads.at(times)
     zero = np.zeros((times.size, loads.station.size))
     columns |= {f"slosh_displacement_{tank}": zero for tank in tanks}

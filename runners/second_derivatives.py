@@ -2,13 +2,15 @@
 
 Along one parameter the mean, the adjoint, its product with the covariance and the mean's own adjoint have tangents that
 obey the same equations with forcing, solved by the same factors; the gradients at the nodes are differentiated by
-CasADi. One parameter costs about as much as the gradient, interpreted.
+CasADi. One parameter costs about as much as the gradient, interpreted. Along a parameter that moves a switch of the
+equations the exact gradient is differentiated by extrapolated central differences, short of where switches meet.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from functools import lru_cache
+from itertools import pairwise
 from typing import TYPE_CHECKING, Literal
 
 import casadi as ca
@@ -18,9 +20,9 @@ from numpy.typing import NDArray
 
 from ..codegen.node_functions import MATRICES, NodeMatrix
 from ..model.assemble import MEAN_TABLES
-from ..model.errors import ParameterValueError
+from ..model.errors import ParameterValueError, SwitchError
 from .collocation_grid import STAGES
-from .sensitivity import Request, end_time, parameter_rows
+from .sensitivity import Request, end_time, parameter_rows, refuse_undefined
 from .sensitivity_gradient import AdjointPair, Combination
 from .stability import warn_if_unstable
 from .start_covariance import start_functions
@@ -30,6 +32,7 @@ if TYPE_CHECKING:
     from .study import Study
 
 MOST = 10  # parameters at once
+DIFFERENCE = 0.01  # of a parameter that moves a switch, the largest change
 
 
 def second_derivatives(
@@ -49,18 +52,25 @@ def second_derivatives(
     warn_if_unstable(study.executable, at)
     pair = request.pair(study, at)
     factors = request.factors(pair)
-    gradient = pair.gradient(*factors).parameters[rows]
+    gradient = pair.gradient(*factors)
+    refuse_undefined(study.system, gradient, rows)
     combined = pair.combine(*factors)
+    moving = [k for k, row in enumerate(rows) if row in gradient.reach]
     hessian = np.array([_column(pair, combined, factors, row)[rows] for row in rows])
     curvature = request.curvature(pair)
     if curvature:
         of_variance = pair.gradient(1.0, 0.0).parameters[rows]
         hessian = hessian + curvature * np.outer(of_variance, of_variance)
+    for k in moving:
+        hessian[k] = _by_differences(study, request, at, rows, k, gradient.reach[rows[k]])
+    for k in moving:
+        still = [i for i in range(len(rows)) if i not in moving]
+        hessian[still, k] = hessian[k, still]
     names = [study.system.parameter_names[i] for i in rows]
     units = [study.system.parameters[i].unit for i in rows]
     return xr.Dataset(
         {
-            "derivative": ("parameter", gradient),
+            "derivative": ("parameter", gradient.parameters[rows]),
             "second_derivative": (("parameter", "with_respect_to"), 0.5 * (hessian + hessian.T)),
             "parameter_value": ("parameter", study.executable.parameters[rows]),
         },
@@ -72,9 +82,32 @@ def second_derivatives(
             "quantity": quantity,
             "t2_s": at,
             "value": request.value(pair.variance, pair.mean),
+            "by_differences": ", ".join(names[k] for k in moving) or "none",
             "asymmetry": float(np.abs(hessian - hessian.T).max() / max(1e-300, np.abs(hessian).max())),
         },
     )
+
+
+def _by_differences(
+    study: Study, request: Request, time: float, rows: list[int], which: int, reach: float
+) -> NDArray[np.float64]:
+    """Return the derivative of the exact gradient along a parameter that moves a switch, by central differences."""
+    name = study.system.parameter_names[rows[which]]
+    if not reach:
+        raise SwitchError(
+            f"there is no second derivative with respect to '{name}': the switch that it moves lies at the start or on "
+            "the end time; name the parameters without it"
+        )
+    value = float(study.executable.parameters[rows[which]])
+
+    def gradient(at: float) -> NDArray[np.float64]:
+        pair = request.pair(study.with_parameters({name: at}), time)
+        return pair.gradient(*request.factors(pair)).parameters[rows]
+
+    step = min(0.25 * reach, DIFFERENCE * (abs(value) or 1.0))
+    slopes = [(gradient(value + h) - gradient(value - h)) / (2 * h) for h in (step, step / 2, step / 4)]
+    once = [fine + (fine - coarse) / 3 for coarse, fine in pairwise(slopes)]  # Richardson: h^2, then h^4
+    return once[1] + (once[1] - once[0]) / 15
 
 
 @lru_cache(maxsize=12)

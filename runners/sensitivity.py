@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 
 from ..codegen.node_functions import node_functions
-from ..model.errors import AscentwindError, AscentwindWarning, TimeRangeError, UnknownNameError
+from ..model.errors import AscentwindError, AscentwindWarning, SwitchError, TimeRangeError, UnknownNameError
 from ..model.system import LinearSystem
 from .flight_nodes import FlightNodes
 from .sensitivity_gradient import AdjointPair, Gradient
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 QUANTITIES: tuple[str, ...] = ("std", "variance", "mean", "mean_plus_3sigma")
 STRUCTURAL = re.compile(
-    r"^options\.|(count|number|order|synthesis|modes?|tanks?|masses|sources?|states?|loads?|outputs?)$"
+    r"^(options|events)\.|(count|number|order|synthesis|modes?|tanks?|masses|sources?|states?|loads?|outputs?)$"
 )
 
 
@@ -157,7 +157,8 @@ def sensitivity(
     warn_if_unstable(study.executable, time)
     pair = request.pair(study, time)
     factors = request.factors(pair)
-    gradient = pair.gradient(*factors)
+    gradient = pair.gradient(*factors, at_peak=at_peak and not at_limit)
+    refuse_undefined(study.system, gradient, rows)
     value = request.value(pair.variance, pair.mean)
     if elasticity and value == 0:
         raise ZeroQuantityError(
@@ -239,6 +240,21 @@ def parameter_rows(system: LinearSystem, wanted: Iterable[str] | None) -> list[i
             raise UnknownNameError("parameter", name, names)
         rows.append(names.index(name))
     return rows
+
+
+def refuse_undefined(system: LinearSystem, gradient: Gradient, rows: Iterable[int]) -> None:
+    """Refuse parameters by which there is no derivative, because of a switch that they move.
+
+    Raises
+    ------
+    SwitchError
+    """
+    for i in rows:
+        if i in gradient.undefined:
+            raise SwitchError(
+                f"there is no derivative with respect to '{system.parameter_names[i]}': {gradient.undefined[i]}; "
+                "name the parameters without it"
+            )
 
 
 def _parameter_sensitivities(study: Study, gradient: Gradient, rows: list[int], value: float | None) -> Parts:

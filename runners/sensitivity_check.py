@@ -6,7 +6,7 @@ uncertainty, which the integrator's tolerance, divided by the step, keeps from v
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Literal
@@ -69,6 +69,12 @@ def central_difference(f: Callable[[float], float], at: float, step: float, leve
     return best
 
 
+def _difference(f: Callable[[float], float], at: float, step: float, value: float) -> Difference:
+    """Differentiate by central differences; no surer than the tolerance lets the smallest of them be."""
+    found = central_difference(f, at, step)
+    return replace(found, uncertainty=max(found.uncertainty, TOLERANCE * abs(value) / (step / 2 ** (LEVELS - 1))))
+
+
 def check_sensitivity(
     study: Study,
     response: str,
@@ -85,6 +91,10 @@ def check_sensitivity(
     found = sensitivity(study, response, time, source, quantity, parameters, elasticity=False)
     time = float(found.attrs["t2_s"])
     value, executable = float(found.attrs["value"]), study.executable
+    meeting: Mapping[int, float] = {}
+    if study.system.conditions:  # switches that meet within the differences would spoil them
+        pair = request.pair(study, time)
+        meeting = {i: far for i, far in pair.gradient(*request.factors(pair)).reach.items() if far > 0}
     labels, at, derivatives, differences = [], [], [], []
     for name, number, derivative in zip(
         found["parameter"].values.tolist(), found["parameter_value"].values, found["derivative"].values, strict=True
@@ -98,7 +108,8 @@ def check_sensitivity(
         labels.append(name)
         at.append(number)
         derivatives.append(derivative)
-        differences.append(central_difference(of_parameter, number, STEP * (abs(number) or 1.0)))
+        reach = 0.5 * meeting.get(study.system.parameter_names.index(name), np.inf)
+        differences.append(_difference(of_parameter, number, min(reach, STEP * (abs(number) or 1.0)), value))
     for k in _largest_rows(found, rows):
         name, number = str(found["knot_table"].values[k]), float(found["knot_value"].values[k])
         row = int(np.sum(found["knot_table"].values[:k] == name))
@@ -110,7 +121,7 @@ def check_sensitivity(
         labels.append(f"{name} at {found['knot_argument'].values[k]:g}")
         at.append(number)
         derivatives.append(float(found["knot_derivative"].values[k]))
-        differences.append(central_difference(of_row, number, STEP * _reach(study.vehicle, name, row)))
+        differences.append(_difference(of_row, number, STEP * _reach(study.vehicle, name, row), value))
     return _agreement(labels, np.array(at), np.array(derivatives), differences, value, found.attrs)
 
 

@@ -13,7 +13,7 @@ from ..codegen.interruption import Workers
 from ..codegen.node_functions import node_functions
 from .cores import available_cores
 from .flight_nodes import FlightNodes
-from .sensitivity import Request, check_end_time, parameter_rows
+from .sensitivity import Request, check_end_time, parameter_rows, refuse_undefined
 from .sensitivity_gradient import AdjointPair
 from .stability import warn_if_unstable
 from .statistics import provenance
@@ -47,6 +47,7 @@ def sensitivities(
         time, request = asked
         pair = AdjointPair(flight, request.row, time, request.sources)
         gradient = pair.gradient(*request.factors(pair))
+        refuse_undefined(study.system, gradient, rows)
         return request.value(pair.variance, pair.mean), gradient.parameters[rows]
 
     with Workers(available_cores()) as pool:

@@ -5,13 +5,16 @@ no covariance matrix (docs/sensitivity.md):
 
     dVar/dq = integral [ 2 a'(dA/dq) y + a' d(BB')/dq a ] dt + a(t0)'(dP0/dq) a(t0) + 2 (dC_i/dq) y(t2)
 
+A parameter that moves a switch of the equations adds what it moves (switch_gradient.py).
+
 The noise columns depend on the mean response m = (alpha, beta, phi); that path is a second adjoint, driven by
 dVar/dm. The mean itself is C_i x + G_i u with x' = A x + E u.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -21,6 +24,7 @@ from ..model.assemble import MEAN_TABLES
 from .collocation_grid import STAGES, tables_at
 from .flight_nodes import FlightNodes
 from .start_covariance import start_functions
+from .switch_gradient import through_switches
 from .time_nodes import interval_after, interval_before
 
 SLOPE_STEP = 1e-3  # s, of central differences of the output matrices, which are cubic in time
@@ -38,12 +42,18 @@ class Gradient:
         Derivative with respect to a table's value at a node, per second.
     tables_at_end : (n_v,) array
         Weight of the delta that the latter holds at t = t2.
+    undefined : dict of int to str
+        Parameters by which there is no derivative, because of a switch that they move, and why.
+    reach : dict of int to float
+        Parameters that move a switch, and how far before it meets another, the start or t2.
     """
 
     value: float
     parameters: NDArray[np.float64]
     tables: NDArray[np.float64]
     tables_at_end: NDArray[np.float64]
+    undefined: Mapping[int, str] = field(default_factory=dict)
+    reach: Mapping[int, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +112,7 @@ class AdjointPair:
         n, steps = len(system.states), int(np.argmin(np.abs(flight.grid.edges - time)))
         self.steps, self.node = steps, float(flight.grid.edges[steps])
         self.mask = np.array([float(noise.source in sources) for noise in system.noises])
-        last = interval_before(system, self.node)
+        last = interval_before(executable, self.node)
         self._low, self.end = last.low, last.high  # the end from the left, where it is a discontinuity
         self.times, self.weights = flight.grid.nodes[:steps].ravel(), flight.grid.weights[:steps].ravel()
         self.tables = flight.tables[: STAGES * steps]
@@ -112,13 +122,13 @@ class AdjointPair:
 
         still = np.zeros((steps, STAGES, n))
         stages, edges = flight.solver.backward(self.at_end["C"][response], still)
-        self.adjoint, self.adjoint_at_start = stages.reshape(-1, n), edges[0]
+        self.adjoint, self.adjoint_at_start, self.adjoint_at_edges = stages.reshape(-1, n), edges[0], edges
         B = self.matrices["B"]
         white = self.mask * B.transposed_times(self.adjoint)
         product = start_functions(system, sources)[0]
         start = np.array(product(executable.parameters, self.adjoint_at_start), float).ravel()
         stages, edges = flight.solver.forward(start, B.times(white).reshape(steps, STAGES, n))
-        self.dual, self.dual_at_end = stages.reshape(-1, n), edges[-1]
+        self.dual, self.dual_at_end, self.dual_at_edges = stages.reshape(-1, n), edges[-1], edges
         self.variance = float(self.weights @ np.sum(white**2, axis=1) + self.adjoint_at_start @ start)
         self.states, self.states_at_end = flight.mean[0][:steps].reshape(-1, n), flight.mean[1][steps]
         self.mean = float(
@@ -132,7 +142,7 @@ class AdjointPair:
         if high < self.node:  # on a discontinuity: its left side
             before, after = max(high - 2 * SLOPE_STEP, low), high
         else:
-            high = interval_after(self.executable.system, self.node).high
+            high = interval_after(self.executable, self.node).high
             before, after = max(self.node - SLOPE_STEP, low), min(self.node + SLOPE_STEP, high)
         first, second = (self.executable.matrices(t, low, high) for t in (before, after))
         i, m, span = self.response, self.at_end, after - before
@@ -179,15 +189,20 @@ class AdjointPair:
             )
         return Combination(numbers, along, last, adjoint, on_outputs, on_outputs_end)
 
-    def gradient(self, variance_factor: float, mean_factor: float) -> Gradient:
-        """Return the derivatives of ``variance_factor`` variance + ``mean_factor`` mean."""
+    def gradient(self, variance_factor: float, mean_factor: float, at_peak: bool = False) -> Gradient:
+        """Return the derivatives of ``variance_factor`` variance + ``mean_factor`` mean.
+
+        ``at_peak`` says that t2 is where it is largest: on a switch that moves, the peak moves along.
+        """
         p, found = self.executable.parameters, self.combine(variance_factor, mean_factor)
         parameters = self.flight.functions.by_parameters(p, found.numbers)
         if variance_factor:
             by_start = start_functions(self.executable.system, self.sources)[1](p, self.adjoint_at_start)
             parameters = parameters + variance_factor * np.array(by_start, float).ravel()
+        by_switches = through_switches(self, variance_factor, mean_factor, at_peak)
+        parameters = parameters + by_switches.parameters
         value = variance_factor * self.variance + mean_factor * self.mean
-        return Gradient(value, parameters, found.tables, found.tables_at_end)
+        return Gradient(value, parameters, found.tables, found.tables_at_end, by_switches.undefined, by_switches.reach)
 
     def mean_path(self, on_tables: NDArray, on_tables_end: NDArray) -> MeanPath | None:
         """Give what the variance owes to the tables of the mean response to the mean's states and outputs."""

@@ -48,9 +48,10 @@ def peak_time(study: Study, request: Request) -> tuple[float, bool]:
         return request.value(pair.variance, pair.mean), on_variance * variance + on_mean * mean
 
     candidates = [times[best]]
-    edges = [low, *(d for d in study.system.discontinuities if low < d < high), high]
+    switches = study.executable.stops(high).times.tolist()
+    edges = [low, *(d for d in switches if low < d < high), high]
     for a, b in pairwise(edges):
-        a = beyond(study.system, a) if a in study.system.discontinuities else a
+        a = beyond(study.system, a) if a in switches else a
         candidates += [t for t in (a, b) if t in edges[1:-1]]
         if quantity(a)[1] > 0 > quantity(b)[1]:
             candidates.append(float(root_scalar(lambda t: quantity(t)[1], bracket=(a, b), xtol=TIME_TOLERANCE).root))

@@ -29,8 +29,7 @@ class Root:
 
 def matrices_at(executable: ExecutableSystem, time: float) -> dict[str, NDArray[np.float64]]:
     """Return A, B, C, D, E, G and the known inputs at a time; at a discontinuity those after it."""
-    system = executable.system
-    here = interval_after(system, time)
+    here = interval_after(executable, time)
     matrices = executable.matrices(time, here.low, here.high)
     for name, matrix in matrices.items():
         if not np.isfinite(matrix).all():
@@ -66,7 +65,7 @@ def first_unstable(executable: ExecutableSystem, end: float, checks: int = 12) -
     """Look for unstable roots at frozen times up to ``end`` and describe the first, None without any."""
     system = executable.system
     begin = system.start
-    for time in sorted({*np.linspace(begin, end, checks), *(i.begin for i in intervals(system, begin, end))}):
+    for time in sorted({*np.linspace(begin, end, checks), *(i.begin for i in intervals(executable, begin, end))}):
         matrix = matrices_at(executable, float(time))["A"]
         if np.linalg.eigvals(matrix).real.max() <= UNSTABLE:
             continue

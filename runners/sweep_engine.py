@@ -18,7 +18,7 @@ from ..model.system import LinearSystem
 from .cores import available_cores
 from .mean_response import MeanResponse, with_mean_tables
 from .step_budget import naming_fastest_root
-from .time_nodes import intervals, on_flight, time_nodes
+from .time_nodes import Interval, intervals, on_flight, time_nodes
 
 LONGEST_SEGMENT = 1.0  # s; weights of the error control are renewed and the Gramians stay well scaled
 LEAST_TOLERANCE, LARGEST_TOLERANCE = 1e-12, 1e-2
@@ -32,9 +32,12 @@ class SweepOptions:
     ----------
     relative_tolerance : float
         Of every standard deviation, between 1e-12 and 1e-2.
+    longest_interval : float
+        Flight is looked at in pieces no longer than this, s.
     """
 
     relative_tolerance: float = 1e-7
+    longest_interval: float = LONGEST_SEGMENT
 
     def __post_init__(self):
         if not LEAST_TOLERANCE <= self.relative_tolerance <= LARGEST_TOLERANCE:
@@ -131,6 +134,7 @@ def sweep(
     times: ArrayLike,
     *,
     relative_tolerance: float = 1e-6,
+    longest_interval: float = LONGEST_SEGMENT,
     weighting_spacing: float | None = None,
     responses: Sequence[str] | None = None,
 ) -> SweepResult:
@@ -145,6 +149,8 @@ def sweep(
         End times, increasing, from the start on, s. One that falls on a discontinuity is taken from the left.
     relative_tolerance : float
         Of every standard deviation, between 1e-12 and 1e-2.
+    longest_interval : float
+        Flight is looked at in pieces no longer than this, s.
     weighting_spacing : float, optional
         Keep the weighting functions at points at most this many seconds apart.
     responses : sequence of str, optional
@@ -157,11 +163,11 @@ def sweep(
     system, ends = engine.system, check_times(engine.system, times)
     SweepOptions(relative_tolerance)
     system.refuse_direct_noise(system.output_names if responses is None else responses)
-    longest = LONGEST_SEGMENT if weighting_spacing is None else min(LONGEST_SEGMENT, weighting_spacing)
-    nodes = time_nodes(system, ends)
+    longest = min(LONGEST_SEGMENT, longest_interval, weighting_spacing or LONGEST_SEGMENT)
+    nodes = time_nodes(executable, ends)
     # an end time at the start needs no integration, only a segment to read it in
     last = nodes[-1] if nodes[-1] > system.start else min(system.end, system.start + longest)
-    segments = flight_segments(system, (*np.unique(nodes[nodes < last]).tolist(), float(last)), longest)
+    segments = flight_segments(executable, (*np.unique(nodes[nodes < last]).tolist(), float(last)), longest)
     with naming_fastest_root(executable):
         result = engine.run(executable, segments, relative_tolerance, transition=weighting_spacing is not None)
     at = np.where(nodes > system.start, np.searchsorted(segments.end, nodes), -1)
@@ -192,8 +198,7 @@ def with_sweep_mean_tables(
     """Return the system with its tables of the mean response filled in by the sweep's own forward mean."""
 
     def mean(of: ExecutableSystem, times: NDArray[np.float64]) -> MeanResponse:
-        system = of.system
-        pieces = intervals(system, float(times[0]), float(times[-1]))
+        pieces = intervals(of, float(times[0]), float(times[-1]))
         which = np.searchsorted([p.end for p in pieces], times[1:])
         low, high = (np.array([getattr(p, side) for p in pieces])[which] for side in ("low", "high"))
         segments = Segments(float(times[0]), np.ascontiguousarray(times[1:]), low, high)
@@ -276,15 +281,20 @@ def check_times(system: LinearSystem, times: ArrayLike) -> NDArray[np.float64]:
     return ends
 
 
-@lru_cache(maxsize=16)
-def flight_segments(system: LinearSystem, end_times: tuple[float, ...], longest: float) -> Segments:
-    """Cut the flight at end times and discontinuities into segments no longer than ``longest`` seconds.
+def flight_segments(executable: ExecutableSystem, end_times: tuple[float, ...], longest: float) -> Segments:
+    """Cut the flight at end times and discontinuities into segments no longer than ``longest`` seconds."""
+    start = executable.system.start
+    return _segments(start, tuple(intervals(executable, start, end_times[-1])), end_times, longest)
 
-    Kept, because every member of a batch asks for the same.
-    """
+
+@lru_cache(maxsize=16)
+def _segments(
+    start: float, pieces_of_flight: tuple[Interval, ...], end_times: tuple[float, ...], longest: float
+) -> Segments:
+    """Cut intervals at end times; kept, because the members of a batch often ask for the same."""
     times = np.array(end_times)
     ends, low, high = [], [], []
-    for interval in intervals(system, system.start, float(times[-1])):
+    for interval in pieces_of_flight:
         inside = times[(times > interval.begin) & (times < interval.end)]
         marks = np.concatenate([[interval.begin], inside, [interval.end]])
         for a, b in pairwise(marks):
@@ -292,7 +302,7 @@ def flight_segments(system: LinearSystem, end_times: tuple[float, ...], longest:
             ends.append(np.append(np.linspace(a, b, pieces + 1)[1:-1], b))
             low.append(np.full(pieces, interval.low))
             high.append(np.full(pieces, interval.high))
-    return Segments(system.start, np.concatenate(ends), np.concatenate(low), np.concatenate(high))
+    return Segments(start, np.concatenate(ends), np.concatenate(low), np.concatenate(high))
 
 
 def _weighting_functions(

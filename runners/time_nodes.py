@@ -7,16 +7,17 @@ switch is the switch, seen from the left, and one next to another end time is th
 
 from __future__ import annotations
 
-from bisect import bisect_left, bisect_right
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..codegen.compiled import ExecutableSystem
 from ..model.switches import rounding
 from ..model.system import LinearSystem
 
+FORWARD = 1.0  # s, looked ahead where a system has no end
 SAME = 1e-9  # of the flight to the last end time: times closer than that are the same
 
 
@@ -30,42 +31,41 @@ class Interval:
     high: float
 
 
-def intervals(system: LinearSystem, begin: float, end: float) -> list[Interval]:
-    """Split [begin, end] at the system's discontinuities, in order of time.
+def intervals(executable: ExecutableSystem, begin: float, end: float, longest: float = float("inf")) -> list[Interval]:
+    """Split [begin, end] where the system jumps, in order of time: as declared, and as its expressions say.
 
-    On either side of a discontinuity matrices are looked up a few roundings away from it, so that a switch which the
-    equations compute in their own way is seen from the right side; an end that falls on a discontinuity is taken from
-    the left, a begin from the right.
+    On either side of a jump matrices are looked up a few roundings away from it, so that a switch which compiled code
+    computes in its own way is seen from the right side; an end that falls on a jump is taken from the left, a begin
+    from the right. Intervals longer than ``longest``, s, are divided.
     """
-    edges = [begin, *(d for d in system.discontinuities if begin < d < end), end]
-    if len(edges) > 2 and _switch_at(system, begin) == edges[1]:
-        del edges[1]
-    if len(edges) > 2 and _switch_at(system, end) == edges[-2]:
-        del edges[-2]
+    stops = executable.stops(end)
+    inside, low, high = stops.between(begin, end)
+    edges = [begin, *stops.times[inside].tolist(), end]
+    lows, highs = [low, *stops.after[inside].tolist()], [*stops.before[inside].tolist(), high]
+    sides = zip(pairwise(edges), lows, highs, strict=True)
     found = []
-    for a, b in pairwise(edges):
-        after, before = _switch_at(system, a), _switch_at(system, b)
-        low = a if after is None else after + rounding(after, system.start)
-        high = b if before is None else before - rounding(before, system.start)
-        found.append(Interval(a, b, min(low, b), max(high, a)))
+    for (a, b), low, high in sides:
+        marks = np.linspace(a, b, 1 + max(1, int(np.ceil((b - a) / longest - 1e-9)))).tolist()
+        found += [Interval(*part, min(low, b), max(high, a)) for part in pairwise(marks)]
     return found
 
 
-def interval_before(system: LinearSystem, time: float) -> Interval:
-    """Return the interval between two discontinuities that ends at ``time``."""
-    return intervals(system, system.start, time)[-1]
+def interval_before(executable: ExecutableSystem, time: float) -> Interval:
+    """Return the interval between two jumps that ends at ``time``."""
+    return intervals(executable, executable.system.start, time)[-1]
 
 
-def interval_after(system: LinearSystem, time: float) -> Interval:
-    """Return the interval between two discontinuities that holds ``time`` or begins there."""
-    (node,) = time_nodes(system, [time])
-    at = bisect_right(system.discontinuities, node)
-    begin = max(system.start, *system.discontinuities[max(at - 1, 0) : at], -np.inf)
-    end = min(system.end, *system.discontinuities[at : at + 1], np.inf)
-    return intervals(system, begin, end)[0]
+def interval_after(executable: ExecutableSystem, time: float) -> Interval:
+    """Return the interval between two jumps that holds ``time`` or begins there."""
+    (node,) = time_nodes(executable, [time])
+    system, times = executable.system, executable.stops(node + FORWARD).times
+    at = int(np.searchsorted(times, node, side="right"))
+    begin = max(system.start, float(times[at - 1]) if at else -np.inf)
+    end = min(system.end, float(times[at]) if at < times.size else max(node + FORWARD, begin + FORWARD))
+    return intervals(executable, begin, end)[0]
 
 
-def time_nodes(system: LinearSystem, times: ArrayLike) -> NDArray[np.float64]:
+def time_nodes(executable: ExecutableSystem, times: ArrayLike) -> NDArray[np.float64]:
     """Return the times at which flight is cut for end times, one for each of them, in increasing order as they are.
 
     Within 1e-9 of the flight to the last of them an end time is the switch nearest to it, or else the end time before
@@ -73,13 +73,14 @@ def time_nodes(system: LinearSystem, times: ArrayLike) -> NDArray[np.float64]:
 
     Parameters
     ----------
-    system : LinearSystem
+    executable : ExecutableSystem
     times : (k,) array
         s, increasing.
     """
+    system = executable.system
     ends = np.clip(np.asarray(times, float), system.start, system.end)
     reach = same_time(system, ends)
-    switches = np.array(system.discontinuities)
+    switches = executable.stops(float(ends.max()) + reach).times
     nodes: list[float] = []
     for time in ends:
         node = float(time)
@@ -112,11 +113,3 @@ def same_time(system: LinearSystem, times: ArrayLike) -> float:
 def beyond(system: LinearSystem, time: float) -> float:
     """Return the nearest end time after a switch that is not the switch itself, s."""
     return min(time + 2 * same_time(system, [time]), system.end)
-
-
-def _switch_at(system: LinearSystem, time: float) -> float | None:
-    """Return the switch that a time is, to rounding."""
-    switches = system.discontinuities
-    at = bisect_left(switches, time)
-    near = [d for d in switches[max(at - 1, 0) : at + 1] if abs(d - time) <= 4 * rounding(d, system.start)]
-    return min(near, key=lambda d: abs(d - time), default=None)

@@ -267,7 +267,7 @@ def test_parameter_that_is_not_finite_is_named():
 def test_matrix_that_is_not_finite_is_named_with_its_time():
     t, x, n = (ca.SX.sym(s) for s in ("t", "x", "n"))
     system = define_system(
-        "pole", time=t, states={"x": (x, -x / ca.fmax(2.0 - t, 0) + n)}, noises={"gust": n}, outputs={"y": x}
+        "pole", time=t, states={"x": (x, -x / ca.floor(3.0 - t) + n)}, noises={"gust": n}, outputs={"y": x}
     )
     with pytest.raises(IntegrationError, match=r"'x' on the rate of 'x' is not finite at t = [23]"):
         sweep(compiled_sweep(system), executable_system(system), [3.0])
