@@ -57,6 +57,7 @@ def run(
     from .along_vehicle_output import prepare_along_vehicle, write_along_vehicle
     from .engines import engine_options
     from .figures import response_figure, weighting_figure, words, write_figure
+    from .manifest import Manifest
     from .output import prepare_folder, write_statistics
     from .study import Study
     from .times import parse_times
@@ -78,6 +79,7 @@ def run(
             options=options,
             progress=lambda t: progress.update(task, advance=1, description=f"end time {t:g} s"),
         )
+        manifest = Manifest.begin(folder, "run", study.system.name)
         written = write_statistics(statistics, folder)
         task = progress.add_task("figures", total=len(statistics["response"]) + len(families) + 1)
         for output in study.system.outputs:
@@ -103,6 +105,8 @@ def run(
     if study.tables(end_times[-1])["altitude"] > top:
         console.print(f"Above {top / 1000:g} km the wind tables end and their last values are held.", style="dim")
     console.print(f"{len(written)} files in {folder}: {', '.join(p.name for p in written)}", soft_wrap=True)
+    for sentence in manifest.finish(written):
+        console.print(sentence, style="dim", soft_wrap=True, markup=False)
 
 
 def _print_peaks(statistics) -> None:

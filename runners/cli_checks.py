@@ -24,6 +24,7 @@ def sensitivity(
     out: Annotated[Path | None, typer.Option(help="Folder for results; VEHICLE-sensitivity without it.")] = None,
 ) -> None:
     """Which parameter, second of a table and kilometre of wind drives a response: exact derivatives, ranked."""
+    from .manifest import Manifest
     from .output import prepare_folder
     from .sensitivity_output import print_sensitivity, write_sensitivity
     from .study import Study
@@ -37,8 +38,11 @@ def sensitivity(
     with console.status("finding the peak and differentiating" if at == "peak" else "differentiating"):
         found = study.sensitivity(response or study.system.output_names[0], at, source=source, quantity=quantity)
     print_sensitivity(found, console)
+    manifest = Manifest.begin(folder, "sensitivity", study.system.name)
     written = write_sensitivity(found, folder)
     console.print(f"{len(written)} files in {folder}: {', '.join(p.name for p in written)}", soft_wrap=True)
+    for sentence in manifest.finish(written):
+        console.print(sentence, style="dim", soft_wrap=True, markup=False)
 
 
 def equations(

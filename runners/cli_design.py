@@ -22,6 +22,7 @@ def design(
     from .design import trade, verify_design
     from .design_file import find_design, load_design
     from .design_output import good, print_design, write_design, write_trade
+    from .manifest import Manifest
     from .output import prepare_folder
 
     file = find_design(task)
@@ -34,6 +35,7 @@ def design(
         status.update("verifying by CVODES")
         verified = verify_design(found)
     print_design(found, verified, console)
+    manifest = Manifest.begin(folder, "design", loaded.problem.study.system.name)
     written = write_design(found, folder)
     if trades and loaded.trade is not None:
         points = {}
@@ -47,5 +49,7 @@ def design(
                 )
         written += write_trade(points, loaded.trade.response, loaded.title, folder)
     console.print(f"{len(written)} files in {folder}: {', '.join(p.name for p in written)}", soft_wrap=True)
+    for sentence in manifest.finish(written):
+        console.print(sentence, style="dim", soft_wrap=True, markup=False)
     if not good(found, verified):
         raise typer.Exit(1)

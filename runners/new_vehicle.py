@@ -1,21 +1,29 @@
-"""Copying a vehicle folder as the start of another one."""
+"""Copying a vehicle folder as the start of another one, under its own name."""
 
 from __future__ import annotations
 
+import csv
+import io
 import re
 import shutil
 import tempfile
 from pathlib import Path
 
-from ..model.construction.construction_file import CONSTRUCTION_FILE
+from ..model.construction.construction_file import CONSTRUCTION_FILE, construction_files
 from ..model.errors import OutputFolderError
 from ..model.folder_files import unsafe_to_copy
 from ..model.shipped import find_vehicle
 from ..model.vehicle import VEHICLE_FILE, load_vehicle
 
+COPIED = "copied from "
+SOURCE = re.compile(rf'(?<![\w"\'])((?:\w+_)?source\s*=\s*")(?!"|{COPIED})')
+
 
 def copy_vehicle(source: str | Path, folder: Path) -> list[Path]:
     """Copy a vehicle into a new folder and name it after the folder.
+
+    The copy has a title of its own, and its sources say that they were copied: its figures and files carry no other
+    vehicle's name as theirs.
 
     Raises
     ------
@@ -23,7 +31,7 @@ def copy_vehicle(source: str | Path, folder: Path) -> list[Path]:
         If the folder exists and is not empty, or cannot be made.
     """
     start = find_vehicle(source)
-    load_vehicle(start)
+    origin = load_vehicle(start).name
     name = re.sub(r"[^A-Za-z0-9_]", "_", folder.resolve().name)
     name = name if name[:1].isalpha() else f"vehicle_{name}"
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
@@ -33,11 +41,54 @@ def copy_vehicle(source: str | Path, folder: Path) -> list[Path]:
         with tempfile.TemporaryDirectory(dir=folder.parent) as work:
             made = Path(work) / "vehicle"
             shutil.copytree(start, made, copy_function=shutil.copyfile, ignore=unsafe_to_copy(start))
-            for file in (VEHICLE_FILE, CONSTRUCTION_FILE):
-                toml = made / file
-                if toml.is_file():
-                    toml.write_text(re.sub(r'(?m)^name = ".*"', f'name = "{name}"', toml.read_text(), count=1))
+            for toml in sorted(made.glob("*.toml")):
+                text = sourced(toml.read_text(encoding="utf-8", errors="surrogateescape"), origin)
+                if toml.name in (VEHICLE_FILE, CONSTRUCTION_FILE):
+                    text = renamed(text, name, origin)
+                toml.write_text(text, encoding="utf-8", errors="surrogateescape")
+            if (made / CONSTRUCTION_FILE).is_file():
+                for file in construction_files(made)[1:]:
+                    file.write_text(sourced_rows(file.read_text(encoding="utf-8-sig"), origin), encoding="utf-8")
             made.replace(folder)
     except OSError as error:
         raise OutputFolderError(f"{folder} cannot be made ({error.strerror or error}); choose another folder") from None
     return sorted(folder.iterdir())
+
+
+def renamed(text: str, name: str, origin: str) -> str:
+    """Return a TOML file under another vehicle's name, with a title of its own."""
+    text = re.sub(r"(?m)^name = .*$", f'name = "{name}"', text, count=1)
+    title = f'title = "{name}, started from {origin}"  # of figures and files: describe your vehicle here'
+    text = re.sub(r"(?m)^title = .*$", title, text, count=1)
+    return (
+        f"# {name}: made from {origin} by 'ascentwind new-vehicle'. It tells of {origin} until you change it,\n"
+        f"# and so does every source that begins with '{COPIED}{origin}'.\n\n{text}"
+    )
+
+
+def sourced(text: str, origin: str) -> str:
+    """Return a TOML file whose sources say from which vehicle they were copied."""
+    return SOURCE.sub(lambda match: f"{match[1]}{COPIED}{origin}: ", text)
+
+
+def sourced_rows(text: str, origin: str) -> str:
+    """Return a CSV file whose column of sources says from which vehicle they were copied.
+
+    A file with cells over several lines stays as it is.
+    """
+    if any(line.count('"') % 2 for line in text.splitlines() if not line.lstrip().startswith("#")):
+        return text
+    lines, column = [], None
+    for line in text.splitlines():
+        cells = next(csv.reader([line]), [])
+        if not cells or line.lstrip().startswith("#"):
+            lines.append(line)
+            continue
+        if column is None:
+            column = next((i for i, cell in enumerate(cells) if cell.strip() == "source"), -1)
+        elif 0 <= column < len(cells) and not cells[column].startswith(COPIED):
+            cells[column] = f"{COPIED}{origin}: {cells[column]}"
+        buffer = io.StringIO()
+        csv.writer(buffer, lineterminator="").writerow(cells)
+        lines.append(buffer.getvalue())
+    return "\n".join(lines) + "\n"

@@ -51,7 +51,9 @@ def test_run_writes_tables_and_figures(ascentwind, tmp_path, as504):
         png = (tmp_path / "found" / f"{name}.png").read_bytes()
         assert png.startswith(b"\x89PNG")
         assert "flight time" in (tmp_path / "found" / f"{name}.svg").read_text() or name == "weighting_functions"
-    assert sorted(p.suffix for p in (tmp_path / "found").iterdir()) == sorted([".nc", ".csv"] + 4 * [".png", ".svg"])
+    assert sorted(p.suffix for p in (tmp_path / "found").iterdir()) == sorted(
+        [".nc", ".csv", ".json"] + 4 * [".png", ".svg"]
+    )
 
 
 def test_sensitivity_ranks_and_writes(ascentwind, tmp_path, as504):

@@ -15,6 +15,7 @@ from ...model.construction import Construction
 from ...model.construction.construction_file import CONSTRUCTION_FILE, construction_files, load_construction
 from ...model.errors import DataError, OutputFolderError
 from ...model.folder_files import file_inside, unsafe_to_copy
+from ...model.plausibility import station_in_name
 from ...model.vehicle import VEHICLE_FILE, load_vehicle
 from ...model.vehicle_file import TableEntry, VehicleFile, read_vehicle_file
 from ..output import prepare_folder, write_whole
@@ -113,6 +114,8 @@ def check_agreement(toml: Path, file: VehicleFile, construction: Construction) -
     def refuse(why: str, key: str) -> None:
         raise DataError(why, file=toml, column=key)
 
+    if file.name != construction.name:
+        refuse(f"is '{file.name}', but {CONSTRUCTION_FILE} tells of '{construction.name}'; make them equal", "name")
     if abs(file.reference_area_m2 - construction.reference_area) > 1e-9 * construction.reference_area:
         refuse(
             f"is {file.reference_area_m2:g}, but {CONSTRUCTION_FILE} has {construction.reference_area:g} m2; make "
@@ -143,6 +146,12 @@ def check_agreement(toml: Path, file: VehicleFile, construction: Construction) -
             refuse(
                 f"{load.station_m:g} m is not one of load_stations_m in {CONSTRUCTION_FILE}; add it there",
                 f"loads.{i}.station_m",
+            )
+        named = station_in_name(load.table.file)
+        if named is not None and not named[0] <= load.station_m <= named[1]:
+            refuse(
+                f"is {load.table.file}, but would hold station {load.station_m:g} m; name it after that station",
+                f"loads.{i}.table.file",
             )
         forward = construction.forward_of_gimbal(load.station_m)
         if load.forward_of_gimbal_m is not None and abs(load.forward_of_gimbal_m - forward) > POSITION_TOLERANCE:
