@@ -11,8 +11,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import DataError, suggestion
+from .errors import DataError, DataErrorCollector, suggestion
 from .numbers import parse_number
+from .text_file import read_text
 
 Order = Literal["increasing", "not decreasing", "any"]
 _HEADER = re.compile(r"^\s*(?P<name>[^\[\]]+?)\s*\[(?P<unit>[^\[\]]*)\]\s*$")
@@ -91,27 +92,25 @@ def read_csv_table(
         raise DataError(f"needs a header and at least {'one row' if order == 'any' else 'two rows'}", file=file)
     (header_line, header), body = rows[0], rows[1:]
     names, units = _read_header(file, header_line, header, text)
-    for name in text:
-        if name not in names:
-            raise DataError(f"column '{name}' is missing; add it, its header without a unit", file=file)
-    data = np.empty((len(body), len(names)))
+    data, collector = np.full((len(body), len(names)), np.nan), DataErrorCollector()
     for i, (line, cells) in enumerate(body):
         if len(cells) != len(names):
-            raise DataError(f"has {len(cells)} cells where the header has {len(names)}", file=file, row=line)
+            why = f"has {len(cells)} cells where the header has {len(names)}"
+            collector.errors.append(DataError(why, file=file, row=line))
+            continue
         for j, cell in enumerate(cells):
-            if names[j] in text:
-                if not cell.strip():
-                    raise DataError("is empty; fill the cell", file=file, column=names[j], row=line)
+            if names[j] not in text:
+                try:
+                    data[i, j] = parse_number(cell)
+                    continue
+                except ValueError:
+                    why = f"'{_short(cell)}' is not a finite number; fill the cell or remove the row"
+            elif cell.strip():
                 continue
-            try:
-                data[i, j] = parse_number(cell)
-            except ValueError:
-                raise DataError(
-                    f"'{cell.strip()}' is not a finite number; fill the cell or remove the row",
-                    file=file,
-                    column=names[j],
-                    row=line,
-                ) from None
+            else:
+                why = "is empty; fill the cell"
+            collector.errors.append(DataError(why, file=file, column=names[j], row=line))
+    collector.raise_all()
     table = CsvTable(
         file,
         units,
@@ -134,37 +133,60 @@ def read_csv_table(
 
 
 def _read_rows(file: Path) -> list[tuple[int, list[str]]]:
-    """Return line number and cells of every line that is neither empty nor a comment."""
-    try:
-        content = file.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise DataError(
-            f"cannot be read ({error.strerror or error}); check the name in the TOML file", file=file
-        ) from None
-    except UnicodeDecodeError:
-        raise DataError("is not UTF-8 text; save it as CSV", file=file) from None
-    return [
-        (number, cells)
-        for number, cells in enumerate(csv.reader(content.splitlines()), start=1)
-        if cells and any(c.strip() for c in cells) and not cells[0].lstrip().startswith("#")
-    ]
+    """Return line number and cells of every line that is neither empty nor a comment, trailing blank columns left out.
+
+    Each line is read by itself: a quote left open in one cannot swallow the next.
+    """
+    rows = []
+    for number, line in enumerate(read_text(file).split("\n"), start=1):
+        if not line.strip() or line.lstrip().startswith("#"):
+            continue
+        try:
+            (cells,) = csv.reader([line], strict=True)
+        except csv.Error as error:
+            raise DataError(
+                f"cannot be read ({error}); a line is a row of cells with commas between them", file=file, row=number
+            ) from None
+        if any(c.strip() for c in cells):
+            rows.append((number, cells))
+    filled = max((max(j for j, c in enumerate(cells) if c.strip()) + 1 for _, cells in rows), default=0)
+    return [(number, cells[:filled]) for number, cells in rows]
 
 
 def _read_header(file: Path, line: int, header: list[str], text: tuple[str, ...]) -> tuple[list[str], dict[str, str]]:
     names: list[str] = []
     units: dict[str, str] = {}
+    collector = DataErrorCollector()
+    if len(header) == 1 and (mark := next((m for m in ";\t|" if m in header[0]), None)):
+        raise DataError(
+            f"has its cells separated by {'tabs' if mark == chr(9) else repr(mark)}; save it with commas between cells "
+            "and points in numbers",
+            file=file,
+            row=line,
+        )
     for cell in header:
         match = _HEADER.match(cell)
         name = match["name"] if match else cell.strip()
-        if not match and name not in text:
-            raise DataError(
-                f"header '{cell.strip()}' has no unit; write it as 'name [unit]', [1] if it has none",
-                file=file,
-                row=line,
-            )
-        if name in names:
-            raise DataError("stands twice in the header", file=file, column=name, row=line)
+        why = None
+        if not name:
+            why = "a column without a header; give it one, such as 'name [unit]', or remove it"
+        elif not match and name not in text:
+            why = f"header '{_short(name)}' has no unit; write it as 'name [unit]', [1] if it has none"
+        if why:
+            collector.errors.append(DataError(why, file=file, row=line))
+        elif name in names:
+            collector.errors.append(DataError("stands twice in the header", file=file, column=_short(name), row=line))
         names.append(name)
         if match:
             units[name] = match["unit"].strip()
+    for name in text:
+        if name not in names:
+            why = f"column '{name}' is missing; add it, its header without a unit"
+            collector.errors.append(DataError(why, file=file))
+    collector.raise_all()
     return names, units
+
+
+def _short(cell: str) -> str:
+    text = cell.strip()
+    return text if len(text) <= 60 else f"{text[:57]}..."

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 
@@ -45,6 +46,55 @@ class DataError(AscentwindError):
         if time is not None:
             where.append(f"t = {time:g} s")
         super().__init__(f"{', '.join(where)}: {why}" if where else why)
+
+
+class SeveralDataErrors(DataError):
+    """Several things that cannot be used, told together; the place is that of the first.
+
+    Parameters
+    ----------
+    errors : iterable of DataError
+    """
+
+    SHOWN = 20
+
+    def __init__(self, errors: Iterable[DataError]):
+        self.errors = tuple(errors)
+        first, more = self.errors[0], len(self.errors) - self.SHOWN
+        super().__init__(first.why, file=first.file, column=first.column, row=first.row, time=first.time)
+        told = [str(error) for error in self.errors[: self.SHOWN]]
+        self.args = ("\n".join(told + ([f"and {more} more"] if more > 0 else [])),)
+
+
+class DataErrorCollector:
+    """Keeps the errors of parts that do not need each other, to raise them together."""
+
+    def __init__(self):
+        self.errors: list[DataError] = []
+
+    @contextmanager
+    def part(self) -> Iterator[None]:
+        """Keep the error with which a part ends."""
+        try:
+            yield
+        except SeveralDataErrors as several:
+            self.errors += several.errors
+        except DataError as error:
+            self.errors.append(error)
+
+    def raise_all(self) -> None:
+        """Raise what was kept, if anything.
+
+        Raises
+        ------
+        DataError
+            The only one, or a ``SeveralDataErrors``.
+        """
+        once = list({str(error): error for error in self.errors}.values())
+        if len(once) == 1:
+            raise once[0]
+        if once:
+            raise SeveralDataErrors(once)
 
 
 class TimeRangeError(AscentwindError):

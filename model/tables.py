@@ -74,11 +74,25 @@ class Table:
             inside = (x >= low) & (x <= high)
             if inside.sum() < 2:
                 raise DataError(f"table '{self.name}' has too few rows between {low:g} and {high:g} to interpolate")
-            piece = _interpolate(x[inside], y[inside], self.interpolation)
+            piece = self._piece(x[inside], y[inside])
             points = np.unique(np.concatenate([[low], piece.x[(piece.x > low) & (piece.x < high)]]))
             knots.append(points)
             coefficients.append(taylor_coefficients(piece, points, points))
         return PPoly(np.concatenate(coefficients, axis=1), np.append(np.concatenate(knots), x[-1]))
+
+    def _piece(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> PPoly:
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            try:
+                piece = _interpolate(x, y, self.interpolation)
+                finite = np.isfinite(piece.c).all()
+            except (ValueError, np.linalg.LinAlgError):  # SciPy's own refusal of what overflows on its way
+                piece, finite = None, False
+        if piece is None or not finite:
+            raise DataError(
+                f"table '{self.name}' cannot be interpolated between {x[0]:g} and {x[-1]:g}: with values up to "
+                f"{np.abs(y).max():g} it leaves the range of numbers; correct them"
+            )
+        return piece
 
 
 def _interpolate(x: NDArray, y: NDArray, interpolation: str) -> PPoly:

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import tomllib
+import unicodedata
 from collections.abc import Mapping
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar, get_args, get_origin
 
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, ValidationInfo, field_validator
+from pydantic_core import ErrorDetails
 
-from .errors import DataError, suggestion
+from .errors import DataError, DataErrorCollector, suggestion
 from .folder_files import OwnPath
+from .text_file import read_text
 
 
 def _whole(value: Any) -> Any:
@@ -22,6 +26,7 @@ def _whole(value: Any) -> Any:
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
 Whole = Annotated[int, BeforeValidator(_whole)]
+CONTROL = ("Cc", "Cs")  # of Unicode: control characters, half pairs
 Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
 
 
@@ -35,11 +40,14 @@ class Section(BaseModel):
 
     @field_validator("*", mode="before")
     @classmethod
-    def _no_truth_for_a_number(cls, value: Any, info: ValidationInfo) -> Any:
-        """Python takes True for the 1 of a choice of numbers."""
+    def _as_written(cls, value: Any, info: ValidationInfo) -> Any:
+        """Refuse True where Python takes it for the 1 of a choice, and text that files and figures cannot hold."""
         annotation = cls.model_fields[str(info.field_name)].annotation
         if isinstance(value, bool) and get_origin(annotation) is Literal:
             raise ValueError(f"should be {' or '.join(map(str, get_args(annotation)))}")
+        for text in value if isinstance(value, tuple) else (value,):
+            if isinstance(text, str) and any(unicodedata.category(c) in CONTROL and c not in "\n\t" for c in text):
+                raise ValueError("holds a control character; remove it")
         return value
 
 
@@ -63,11 +71,13 @@ def read_toml(file: Path, model: type[File], changes: Mapping[str, Any] | None =
         The file, the key in it, what is wrong and the nearest valid key.
     """
     try:
-        data = tomllib.loads(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise DataError(f"cannot be read ({error.strerror or error})", file=file) from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        data = tomllib.loads(read_text(file))
+    except tomllib.TOMLDecodeError as error:
         raise DataError(f"is not valid TOML: {error}", file=file) from None
+    except ValueError as error:  # an integer of thousands of digits
+        raise DataError(f"holds a number that cannot be read ({error})", file=file) from None
+    except RecursionError:
+        raise DataError("nests lists or tables too deep; the deepest here has a handful of levels", file=file) from None
     for dotted, value in (changes or {}).items():
         _put(data, dotted, _own(value), file)
     return validated(data, model, file)
@@ -83,19 +93,46 @@ def validated(data: Mapping[str, Any], model: type[File], file: Path | None = No
     try:
         return model.model_validate(_plain(data) if file is not None else _own(_plain(data)))
     except ValidationError as error:
-        errors = error.errors()
-        # a misspelt key is missing too; its spelling helps more
-        first = next((e for e in errors if e["type"] == "extra_forbidden"), errors[0])
-        location = [str(part) for part in first["loc"]]
-        if first["type"] == "extra_forbidden":
-            why = f"is not a key here{suggestion(location[-1], _keys_at(model, location[:-1]))}"
-        elif first["type"] == "missing":
-            why = "is missing; add it"
-        else:
-            why = str(first["msg"]).removeprefix("Value error, ").replace("valid tuple", "valid list")
-            if not isinstance(first["input"], dict | tuple):
-                why += f" (found {first['input']!r})"
-        raise DataError(why, file=file, column=".".join(location) or None) from None
+        found = _told_once(error.errors())
+    except RecursionError:
+        raise DataError("nests lists or tables too deep; the deepest here has a handful of levels", file=file) from None
+    collector = DataErrorCollector()
+    collector.errors = [_data_error(e, model, file) for e in found]
+    collector.raise_all()
+    raise AssertionError("an invalid file without an error")
+
+
+def _told_once(errors: list[ErrorDetails]) -> list[ErrorDetails]:
+    """Return errors, misspelt keys first; the key that is missing for each of them is not told beside it."""
+    misspelt = [e for e in errors if e["type"] == "extra_forbidden"]
+    meant = set()
+    for e in misspelt:
+        missing = {
+            str(m["loc"][-1]): m["loc"] for m in errors if m["type"] == "missing" and m["loc"][:-1] == e["loc"][:-1]
+        }
+        meant |= {missing[near] for near in get_close_matches(str(e["loc"][-1]), missing, n=1, cutoff=0.5)}
+    return misspelt + [e for e in errors if e["type"] != "extra_forbidden" and e["loc"] not in meant]
+
+
+def _data_error(error: ErrorDetails, model: type[Section], file: Path | None) -> DataError:
+    location = [str(part) for part in error["loc"]]
+    if error["type"] == "extra_forbidden":
+        why = f"is not a key here{suggestion(location[-1], _keys_at(model, location[:-1]))}"
+    elif error["type"] == "missing":
+        why = "is missing; add it"
+    else:
+        why = str(error["msg"]).removeprefix("Value error, ").replace("valid tuple", "valid list")
+        if not isinstance(error["input"], dict | tuple):
+            why += f" (found {_short(error['input'])})"
+    return DataError(why, file=file, column=".".join(part[:60] for part in location) or None)
+
+
+def _short(value: object) -> str:
+    try:
+        text = repr(value)
+    except ValueError:
+        return "an integer of thousands of digits"
+    return text if len(text) <= 60 else f"{text[:57]}..."
 
 
 def _plain(value: Any) -> Any:

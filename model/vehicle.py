@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from .csv_table import CsvTable, read_csv_table
-from .errors import DataError, suggestion
+from .errors import DataError, DataErrorCollector, suggestion
 from .folder_files import file_inside
 from .load_relief import SCHEDULE_COLUMNS, mode_columns
 from .loads import REACTION_COLUMNS, load_columns
@@ -30,6 +30,7 @@ from .vehicle_file import (
     WindEntry,
     read_vehicle_file,
 )
+from .vehicle_names import name_faults
 from .wind_filter import TwoPartKernel
 from .wind_filter_file import read_filter
 from .wind_statistics import WindModel, closed_form_filter, report_standard_deviation
@@ -134,6 +135,7 @@ def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehi
         raise DataError(f"holds no {VEHICLE_FILE}; start from 'ascentwind new-vehicle DIR --from as504'", file=folder)
     file = read_vehicle_file(file_inside(folder, VEHICLE_FILE), changes)
     reader = _Reader(folder, toml, file)
+    reader.collector.errors += [DataError(why, file=toml, column=key) for key, why in name_faults(file)]
     for name, columns in (
         ("rigid_body", RIGID_BODY),
         ("trajectory", TRAJECTORY),
@@ -144,17 +146,12 @@ def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehi
     reader.add("control.gains", file.control.gains, GAINS, "control.")
     _add_load_relief(reader, file)
     tanks = [tank.name for tank in file.slosh]
-    if len(set(tanks)) < len(tanks):
-        raise DataError("two slosh tanks have the same name; rename one", file=toml, column="slosh")
     file = _with_noise_loads(file, folder, toml)
     of_loads, of_modes = needed_columns(file)
     for i, mode in enumerate(file.bending, start=1):
         reader.add(f"bending.{i}", mode.table, (*_bending_columns(tanks), *of_modes), f"bending.{i}.", (MOVED_MODE,))
     for tank in file.slosh:
         reader.add(f"slosh.{tank.name}", tank.table, SLOSH, f"slosh.{tank.name}.")
-    outputs = [load.output for load in file.loads]
-    if len(set(outputs)) < len(outputs):
-        raise DataError("two loads have the same output name; rename one", file=toml, column="loads")
     for load in file.loads:
         columns = dict.fromkeys((*load_columns(len(file.bending), tanks), *of_loads))
         if file.options.slosh_reaction:
@@ -169,13 +166,17 @@ def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehi
         reader.add(f"loads.{load.output}", load.table, tuple(columns), f"loads.{load.output}.", unused)
     if file.options.local_angle_of_attack:
         _add_local(reader, file)
+    wind = None
+    with reader.collector.part():
+        wind = _load_wind(folder, file.wind, reader)
+    reader.collector.raise_all()
     for name, noise in file.noise.items():
         for table in noise.tables:
             if table not in reader.tables:
-                raise DataError(
-                    f"there is no table '{table}'{suggestion(table, reader.tables)}", file=toml, column=f"noise.{name}"
-                )
-    wind = _load_wind(folder, file.wind, reader)
+                why = f"there is no table '{table}'{suggestion(table, reader.tables)}"
+                reader.collector.errors.append(DataError(why, file=toml, column=f"noise.{name}"))
+    reader.collector.raise_all()
+    assert wind is not None  # its error was raised
     timed = [s for s in reader.sources if not s.name.startswith(("wind", "control."))]
     first, last = max(timed, key=lambda s: s.first), min(timed, key=lambda s: s.last)
     start = file.start_time_s
@@ -258,14 +259,17 @@ class _Reader:
         self.tables: dict[str, Table] = {}
         self.sources: list[TableSource] = []
         self.discontinuities: set[float] = set()
+        self.collector = DataErrorCollector()
 
     def read(self, name: str, entry: TableEntry, columns, argument: str, unit: str, unused=()) -> CsvTable:
         csv = read_csv_table(file_inside(self.folder, entry.file), argument, unit)
-        x = csv.columns[argument]
+        x, collector = csv.columns[argument], DataErrorCollector()
         for column, column_unit, sign in columns:
-            csv.column(column, column_unit)
-            if sign:
-                csv.require_positive(column, allow_zero=sign == "0")
+            with collector.part():
+                csv.column(column, column_unit)
+                if sign:
+                    csv.require_positive(column, allow_zero=sign == "0")
+        collector.raise_all()
         unknown = set(csv.columns) - {c for c, _, _ in (*columns, *unused)} - {argument}
         if unknown:
             name = sorted(unknown)[0]
@@ -278,6 +282,11 @@ class _Reader:
         return csv
 
     def add(self, name: str, entry: TableEntry, columns, prefix: str = "", unused=()) -> None:
+        """Read a table; what is wrong with it is kept in ``collector``."""
+        with self.collector.part():
+            self._add(name, entry, columns, prefix, unused)
+
+    def _add(self, name: str, entry: TableEntry, columns, prefix: str, unused) -> None:
         csv = self.read(name, entry, columns, "time", "s", unused)
         for event in entry.events:
             if event not in self.events:

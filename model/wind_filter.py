@@ -59,6 +59,11 @@ class ShapingFilter:
     source: str = ""
 
     def __post_init__(self):
+        if self.altitude.ndim != 1 or self.start_covariance.ndim != 2 or not self.start_covariance.size:
+            raise DataError(
+                f"filter '{self.name}': altitudes are a list and the start covariance is a square matrix; they have "
+                f"the shapes {self.altitude.shape} and {self.start_covariance.shape}"
+            )
         k, n = self.altitude.size, self.start_covariance.shape[0]
         shapes = (self.F.shape == (k, n, n), self.G.ndim == 3 and self.G.shape[:2] == (k, n), self.H.shape == (k, n))
         if not all(shapes) or self.start_covariance.shape != (n, n):
@@ -69,8 +74,17 @@ class ShapingFilter:
         for label, values in (("F", self.F), ("G", self.G), ("H", self.H), ("start covariance", self.start_covariance)):
             if not np.isfinite(values).all():
                 raise DataError(f"filter '{self.name}': {label} holds a value that is not finite")
-        if k < 2 or not (np.diff(self.altitude) > 0).all():
+        if not np.isfinite(self.altitude).all() or k < 2 or not (np.diff(self.altitude) > 0).all():
             raise DataError(f"filter '{self.name}': altitudes must increase")
+        kinks = np.array(self.kinks, dtype=object)
+        if kinks.ndim != 1 or not all(isinstance(x, int | float) for x in self.kinks):
+            raise DataError(f"filter '{self.name}': kinks are a list of altitudes, such as [10000.0], or an empty one")
+        for kink in self.kinks:
+            if not np.isclose(self.altitude, kink, rtol=1e-9, atol=1e-6).any():
+                raise DataError(
+                    f"filter '{self.name}': the kink at {kink:g} m is none of its altitudes; add a sample there, or "
+                    "remove it"
+                )
         if not np.allclose(self.start_covariance, self.start_covariance.T) or (
             np.linalg.eigvalsh(self.start_covariance).min() < -1e-9 * max(1e-300, np.trace(self.start_covariance))
         ):

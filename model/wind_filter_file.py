@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import DataError
+from .text_file import read_text
 from .wind_filter import ShapingFilter
 
 FORMAT = 1
@@ -36,17 +37,17 @@ def read_filter(file: Path) -> ShapingFilter:
         The file and what is wrong with it.
     """
     try:
-        data = json.loads(file.read_text(encoding="utf-8"), object_pairs_hook=_each_once, parse_constant=_no_number)
+        data = json.loads(read_text(file), object_pairs_hook=_each_once, parse_constant=_no_number)
         if data.get("format") != FORMAT or isinstance(data["format"], bool):
             raise DataError(f"has format {data.get('format')!r}; this version reads {FORMAT}", file=file)
         altitude, F, G, H, start, kinks = (_numbers(data[k], k) for k in KEYS)
         return ShapingFilter(str(data["name"]), altitude, F, G, H, start, tuple(kinks.tolist()), str(data["source"]))
-    except OSError as error:
-        raise DataError(f"cannot be read ({error.strerror or error})", file=file) from None
     except KeyError as error:
         raise DataError(f"lacks {error}; write filters with 'ascentwind wind fit'", file=file) from None
     except (ValueError, TypeError, AttributeError, IndexError, OverflowError) as error:
         raise DataError(f"is not a wind filter: {error}", file=file) from None
+    except RecursionError:
+        raise DataError("nests lists too deep; write filters with 'ascentwind wind fit'", file=file) from None
     except DataError as error:
         raise DataError(error.why, file=file) from None
 

@@ -70,7 +70,7 @@ def write_along_vehicle(study: Study, times: list[float], time: float | None, fo
     text = along_csv(found)
     return [
         write_whole(folder / f"{NAME}.nc", lambda p: found.to_netcdf(p, engine="scipy")),
-        write_whole(folder / f"{NAME}.csv", lambda p: p.write_text(text)),
+        write_whole(folder / f"{NAME}.csv", lambda p: p.write_text(text, encoding="utf-8")),
         *write_figure(along_figure(found, time, study.vehicle), folder, NAME),
     ]
 

@@ -11,6 +11,7 @@ from typing import Annotated, TextIO
 import typer
 from rich.logging import RichHandler
 from rich.table import Table
+from rich.text import Text
 
 from ..model.errors import AscentwindError, AscentwindWarning
 from .cli_build import build_vehicle
@@ -20,7 +21,15 @@ from .cli_mean import mean
 from .cli_reproduce import reproduce
 from .cli_study import study
 from .cli_wind import app as wind_app
-from .terminal import VehicleArgument, console, errors, parse_changes, progress_bar
+from .terminal import (
+    VehicleArgument,
+    console,
+    errors,
+    parse_changes,
+    progress_bar,
+    results_folder,
+    use_plain_characters,
+)
 
 app = typer.Typer(
     add_completion=False,
@@ -62,8 +71,7 @@ def run(
     from .study import Study
     from .times import parse_times
 
-    folder = out or Path(f"{Path(vehicle).name}-results")
-    prepare_folder(folder)
+    folder = out or results_folder(vehicle, "results")
     engine, options = engine_options(engine, method=method, relative_tolerance=tolerance)
     with console.status("loading and preparing code"):
         study = Study.load(vehicle, changes=parse_changes(changes or []))
@@ -71,6 +79,8 @@ def run(
     end_times = parse_times(times or study.vehicle.file.default_times)
     moment_time = None if along_vehicle is None else prepare_along_vehicle(study, along_vehicle)
     families = [t for t in study.vehicle.file.weighting_times_s if study.system.start < t <= study.system.end]
+    study._check_times(end_times)
+    prepare_folder(folder)
     with progress_bar() as progress:
         task = progress.add_task("end times", total=len(end_times))
         statistics = study.response_statistics(
@@ -203,12 +213,13 @@ def doctor() -> None:
     table = Table("what", "found", "")
     verdicts = diagnose()
     for line in verdicts:
-        table.add_row(line.what, line.found, "[green]ok[/]" if line.good else f"[yellow]{line.advice}[/]")
+        table.add_row(line.what, line.found, Text("ok", "green") if line.good else Text(line.advice, "yellow"))
     console.print(table)
 
 
 def main() -> None:
     """Run the command line; errors that ascentwind raises on purpose end with their sentence and exit code 2."""
+    use_plain_characters()
     logging.basicConfig(
         level=logging.INFO,
         format="%(message)s",
@@ -218,7 +229,7 @@ def main() -> None:
     try:
         app()
     except AscentwindError as error:
-        errors.print(f"[bold red]error:[/] {_escape(str(error))}", soft_wrap=True, highlight=False)
+        errors.print(Text.assemble(("error:", "bold red"), f" {error}"), soft_wrap=True)
         sys.exit(2)
 
 
@@ -231,10 +242,6 @@ def _show_warning(
     line: str | None = None,
 ) -> None:
     if issubclass(category, AscentwindWarning):
-        errors.print(f"[yellow]warning:[/] {_escape(str(message))}", soft_wrap=True, highlight=False)
+        errors.print(Text.assemble(("warning:", "yellow"), f" {message}"), soft_wrap=True)
     else:
         sys.stderr.write(warnings.formatwarning(message, category, filename, lineno, line))
-
-
-def _escape(text: str) -> str:
-    return text.replace("[", r"\[")

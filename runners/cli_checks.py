@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from ..model.errors import DataError
-from .terminal import VehicleArgument, console, progress_bar
+from .terminal import VehicleArgument, console, progress_bar, results_folder
 
 WIDE = 150  # columns: tables that a narrow terminal wraps but a file keeps whole
 
@@ -31,10 +31,10 @@ def sensitivity(
     from .times import parse_time_or_peak
 
     at = parse_time_or_peak(time)
-    folder = out or Path(f"{Path(vehicle).name}-sensitivity")
-    prepare_folder(folder)
+    folder = out or results_folder(vehicle, "sensitivity")
     with console.status("loading and preparing code"):
         study = Study.load(vehicle)
+    prepare_folder(folder)
     with console.status("finding the peak and differentiating" if at == "peak" else "differentiating"):
         found = study.sensitivity(response or study.system.output_names[0], at, source=source, quantity=quantity)
     print_sensitivity(found, console)
@@ -65,7 +65,7 @@ def equations(
     study = Study.load(vehicle)
     if page is not None:
         text = equations_page(study)
-        write_whole(page, lambda p: p.write_text(text))
+        write_whole(page, lambda p: p.write_text(text, encoding="utf-8"))
         console.print(f"{page} written", soft_wrap=True)
     elif of is not None:
         typer.echo(equation_latex(study, of, by))
@@ -93,10 +93,10 @@ def verify(
     from .verify import verify as run_verification
 
     options = EnsembleOptions(runs=runs, seed=seed, paths=min(30, runs) if out else 0)
-    if out:
-        prepare_folder(out)
     with console.status("loading and preparing code"):
         study = Study.load(vehicle)
+    if out:
+        prepare_folder(out)
     assert study.vehicle is not None
     end_times = parse_times(times) if times else spread_over(parse_times(study.vehicle.file.default_times), 4)
     with console.status("computing with every engine"):
@@ -141,7 +141,7 @@ def _print_verification(found) -> None:
                     f"{std:.4g}", f"{low:.4g} to {high:.4g}", "yes" if found.inside[k, r, s] else "no",
                     end_section=s + 1 == reference["source"].size,
                 )  # fmt: skip
-    Console(file=console.file, width=max(console.width, WIDE)).print(table)
+    Console(file=console.file, width=max(console.width, WIDE), emoji=False, markup=False).print(table)
 
 
 def tolerance(
@@ -159,14 +159,14 @@ def tolerance(
     from .times import parse_times, time_of_greatest_dynamic_pressure
     from .tolerance import TOLERANCES, measure, pacing
 
-    folder = out or Path(f"{Path(vehicle).name}-tolerance")
-    prepare_folder(folder)
+    folder = out or results_folder(vehicle, "tolerance")
     end_times = parse_times(times) if times else []
     with console.status("loading and preparing code"):
         study = Study.load(vehicle)
     assert study.vehicle is not None
     end_times = end_times or [time_of_greatest_dynamic_pressure(study.vehicle)]
     named = times or f"{end_times[0]:g}"
+    prepare_folder(folder)
     with progress_bar() as progress:
         task = progress.add_task("tolerances", total=len(TOLERANCES))
         measured = measure(study, end_times, progress=lambda _: progress.update(task, advance=1))

@@ -23,10 +23,10 @@ def mean(
     from .output import prepare_folder
     from .study import Study
 
-    if out:
-        prepare_folder(out)
     with console.status("flying through the mean wind"):
         study = Study.load(vehicle)
+        if out:
+            prepare_folder(out)
         found = mean_comparison(study)
     table = Table("response", "linear, peak deg", "at s", "nonlinearity, deg", "at s", "bending and slosh, deg", "at s")
     degrees = found["mean"] * (180 / np.pi)

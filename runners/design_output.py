@@ -73,7 +73,7 @@ def write_design(result: DesignResult, folder: Path) -> list[Path]:
         writer.writerow(("result", q.name, q.unit, f"{q.before:.10g}", f"{q.after:.10g}", limit, f"{q.time_after:g}"))
     for name, multiplier in result.stationarity.multipliers:
         writer.writerow(("active", name, "1", "", f"{multiplier:.6g}", "", ""))
-    return [write_whole(folder / "design.csv", lambda p: p.write_text(buffer.getvalue()))]
+    return [write_whole(folder / "design.csv", lambda p: p.write_text(buffer.getvalue(), encoding="utf-8"))]
 
 
 def write_trade(trades: Mapping[str, Sequence[TradePoint]], response: str, title: str, folder: Path) -> list[Path]:
@@ -93,7 +93,7 @@ def write_trade(trades: Mapping[str, Sequence[TradePoint]], response: str, title
                 row += ["", f"{point.result.peak:.10g}", f"{reached:.10g}", str(int(point.result.converged))]
                 row += [f"{point.result.values[n]:.8g}" if n in point.result.values else "" for n in names]
             writer.writerow(row)
-    written = [write_whole(folder / "trade.csv", lambda p: p.write_text(buffer.getvalue()))]
+    written = [write_whole(folder / "trade.csv", lambda p: p.write_text(buffer.getvalue(), encoding="utf-8"))]
     if results:
         written += write_figure(trade_figure(trades, response, title), folder, "trade")
     return written

@@ -10,10 +10,13 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib import rc_context
+from matplotlib.axis import Axis, Tick
 from matplotlib.figure import Figure
-from matplotlib.ticker import NullFormatter
+from matplotlib.text import Text
+from matplotlib.ticker import FixedFormatter, FuncFormatter, NullFormatter
 from numpy.typing import ArrayLike
 
+from ..model.names import file_name
 from .output import write_whole
 from .statistics import COMBINED, ResponseStatistics
 from .tolerance import Measurement, Pace
@@ -181,9 +184,24 @@ def tolerance_figure(measurements: Sequence[Measurement], paces: Sequence[Pace],
 
 
 def write_figure(figure: Figure, folder: Path, name: str) -> list[Path]:
-    """Write a figure as PNG and SVG."""
+    """Write a figure as PNG and SVG; a dollar sign in a title or name stays one."""
+    name = file_name(name)
+    _take_dollars_as_written(figure)
     with rc_context(STYLE):
         return [
             write_whole(folder / f"{name}.png", lambda p: figure.savefig(p, dpi=150)),
             write_whole(folder / f"{name}.svg", lambda p: figure.savefig(p, metadata={"Date": None})),
         ]
+
+
+def _take_dollars_as_written(figure: Figure) -> None:
+    """Keep titles and names from being read as mathematics, which only the powers of ten on axes are."""
+    axes = [axis for axis in figure.findobj(Axis) if isinstance(axis, Axis)]
+    numbers = set()  # tick labels, and what stands beside them
+    for axis in axes:
+        numbers.add(axis.offsetText)
+        if not isinstance(axis.get_major_formatter(), FixedFormatter | FuncFormatter):
+            numbers |= {label for tick in axis.findobj(Tick) for label in (tick.label1, tick.label2)}
+    for text in figure.findobj(Text):
+        if text not in numbers:
+            text.set_parse_math(False)

@@ -28,10 +28,12 @@ def copy_vehicle(source: str | Path, folder: Path) -> list[Path]:
     Raises
     ------
     OutputFolderError
-        If the folder exists and is not empty, or cannot be made.
+        If the folder exists and is not empty, lies inside the vehicle copied, or cannot be made.
     """
     start = find_vehicle(source)
     origin = load_vehicle(start).name
+    if folder.resolve().is_relative_to(start.resolve()):
+        raise OutputFolderError(f"{folder} lies inside {start}, the vehicle to copy; choose a folder beside it")
     name = re.sub(r"[^A-Za-z0-9_]", "_", folder.resolve().name)
     name = name if name[:1].isalpha() else f"vehicle_{name}"
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
@@ -42,7 +44,7 @@ def copy_vehicle(source: str | Path, folder: Path) -> list[Path]:
             made = Path(work) / "vehicle"
             shutil.copytree(start, made, copy_function=shutil.copyfile, ignore=unsafe_to_copy(start))
             for toml in sorted(made.glob("*.toml")):
-                text = sourced(toml.read_text(encoding="utf-8", errors="surrogateescape"), origin)
+                text = sourced(toml.read_text(encoding="utf-8-sig", errors="surrogateescape"), origin)
                 if toml.name in (VEHICLE_FILE, CONSTRUCTION_FILE):
                     text = renamed(text, name, origin)
                 toml.write_text(text, encoding="utf-8", errors="surrogateescape")

@@ -81,7 +81,7 @@ def write_statistics(statistics: ResponseStatistics, folder: Path) -> list[Path]
     text = statistics_csv(statistics)
     return [
         write_whole(folder / "statistics.nc", lambda p: statistics.to_netcdf(p, engine="scipy")),
-        write_whole(folder / "statistics.csv", lambda p: p.write_text(text)),
+        write_whole(folder / "statistics.csv", lambda p: p.write_text(text, encoding="utf-8")),
     ]
 
 

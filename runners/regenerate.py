@@ -59,19 +59,19 @@ def regenerate(vehicle: str | Path, folder: Path) -> dict[Path, str]:
     states = {}
     for name, text in generated_files(system).items():
         path = target / name
-        if path.is_file() and path.read_text() == text:
+        if path.is_file() and path.read_text(encoding="utf-8") == text:
             states[path] = "unchanged"
             continue
         changes = describe_changes(before, dict(system.structure)) if before else []
         states[path] = (
             f"written ({'; '.join(changes) or ('equations, names or code generator changed' if before else 'new')})"
         )
-        write_whole(path, lambda p, text=text: p.write_text(text))
+        write_whole(path, lambda p, text=text: p.write_text(text, encoding="utf-8"))
     return states
 
 
 def _structure(manifest: Path) -> dict[str, str] | None:
     try:
-        return json.loads(manifest.read_text())["structure"]
+        return json.loads(manifest.read_text(encoding="utf-8"))["structure"]
     except (OSError, ValueError, KeyError):
         return None

@@ -44,7 +44,7 @@ def write_sensitivity(found: xr.Dataset, folder: Path) -> list[Path]:
     text = sensitivity_csv(found)
     written = [
         write_whole(folder / "sensitivity.nc", lambda p: found.to_netcdf(p, engine="scipy")),
-        write_whole(folder / "sensitivity.csv", lambda p: p.write_text(text)),
+        write_whole(folder / "sensitivity.csv", lambda p: p.write_text(text, encoding="utf-8")),
         *write_figure(tornado_figure(found), folder, "sensitivity_tornado"),
     ]
     if "table_elasticity" in found:

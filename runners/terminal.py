@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import codecs
+import io
+import sys
 import tomllib
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -13,10 +17,34 @@ from rich.table import Table
 
 from ..model.errors import DataError
 
-console = Console(emoji=False)  # '40:100:5' is no emoji
-errors = Console(stderr=True, emoji=False)
+# '40:100:5' is no emoji, and a folder called '[/red]' no markup
+console = Console(emoji=False, markup=False)
+errors = Console(stderr=True, emoji=False, markup=False)
+
+# for consoles whose encoding has no such character
+_PLAIN = {"σ": "sigma", "±": "+-", "·": ".", "²": "2", "₂": "2", "µ": "u", "–": "-", "…": "..."}
 
 WIDEST = 1000  # columns
+
+
+def _plain_character(error: UnicodeError) -> tuple[str, int]:
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    return "".join(_PLAIN.get(c, "?") for c in error.object[error.start : error.end]), error.end
+
+
+def use_plain_characters() -> None:
+    """Print what a console's encoding lacks (sigma on cp1252) in other characters instead of ending there."""
+    codecs.register_error("plain", _plain_character)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="plain")
+
+
+def results_folder(vehicle: str, ending: str) -> Path:
+    """Return the folder for results where none is named: the vehicle's name and ``ending``, where one stands."""
+    return Path(f"{Path(vehicle).resolve().name or 'vehicle'}-{ending}")
+
 
 VehicleArgument = Annotated[str, typer.Argument(help="A shipped vehicle ('ascentwind vehicles') or a vehicle folder.")]
 
@@ -36,8 +64,8 @@ def parse_changes(texts: Sequence[str]) -> dict[str, Any]:
             raise DataError(f"'{text}' changes nothing; write KEY=VALUE, such as options.full_coupling=true")
         try:
             read = tomllib.loads(f"value = {value}")
-        except tomllib.TOMLDecodeError:
-            raise DataError(f"'{value}' is not a TOML value; text needs quotes, true and numbers none") from None
+        except (ValueError, RecursionError):
+            raise DataError(f"'{value:.60}' is not a TOML value; text needs quotes, true and numbers none") from None
         if list(read) != ["value"]:
             raise DataError(f"'{value}' is more than one TOML value; write one --set for each key")
         changes[key.strip()] = read["value"]
@@ -59,5 +87,5 @@ def progress_bar() -> Progress:
 
 def print_whole(table: Table, console: Console) -> None:
     """Print a table as wide as it is: a narrow terminal wraps its lines, but no number is cut off."""
-    needed = Console(width=WIDEST, emoji=False).measure(table).maximum
-    Console(file=console.file, width=max(console.width, needed), emoji=False).print(table)
+    needed = Console(width=WIDEST, emoji=False, markup=False).measure(table).maximum
+    Console(file=console.file, width=max(console.width, needed), emoji=False, markup=False).print(table)

@@ -29,13 +29,13 @@ def coefficient_figure(
     rate = np.gradient(altitude, time)
     values = [shaping_filter.at(h) for h in altitude]
     panels = {
-        r"$\dot h F$, 1/s": (shaping_filter.order, shaping_filter.order, lambda v, r: r * v[0]),
-        r"$\sqrt{\dot h}\, G$, 1/$\sqrt{\mathrm{s}}$": (
+        "ḣ F, 1/s": (shaping_filter.order, shaping_filter.order, lambda v, r: r * v[0]),
+        "√ḣ G, 1/√s": (
             shaping_filter.order,
             shaping_filter.noise_count,
             lambda v, r: np.sqrt(max(r, 0.0)) * v[1],
         ),
-        "$H$, m/s": (1, shaping_filter.order, lambda v, r: v[2][None]),
+        "H, m/s": (1, shaping_filter.order, lambda v, r: v[2][None]),
     }
     with rc_context(STYLE):
         figure = Figure(figsize=(8, 9), layout="constrained")

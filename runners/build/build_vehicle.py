@@ -77,7 +77,7 @@ def build_vehicle(
             shutil.copytree(folder, made, copy_function=shutil.copyfile, ignore=unsafe_to_copy(folder))
             for name, text in texts.items():
                 (made / name).parent.mkdir(parents=True, exist_ok=True)
-                (made / name).write_text(text)
+                (made / name).write_text(text, encoding="utf-8")
             _load(made, folder)
             if out is not None:
                 made.replace(target)
@@ -87,7 +87,7 @@ def build_vehicle(
         for name, text in texts.items():
             path = file_inside(target, name)
             prepare_folder(path.parent)
-            write_whole(path, lambda p, text=text: p.write_text(text))
+            write_whole(path, lambda p, text=text: p.write_text(text, encoding="utf-8"))
     return numbers, [target / name for name in texts]
 
 

@@ -48,7 +48,7 @@ def rebuilt(
     file = read_vehicle_file(folder / VEHICLE_FILE, changes)
     numbers = adjust(compute_vehicle(alter(load_construction(folder, construction))))
     for name, (note, columns) in vehicle_tables(numbers, file).items():
-        (out / name).write_text(table_text((note,), columns))
+        (out / name).write_text(table_text((note,), columns), encoding="utf-8")
     return out
 
 
