@@ -48,7 +48,8 @@ def secret(tmp_path) -> Path:
 def test_keys_of_vehicle_toml(edit, secret, key, name):
     old = VEHICLE_KEYS[key]
     folder = edit(old, f'{old.split(" = ")[0]} = "{name}"')
-    with pytest.raises(DataError, match=r"leads out of the folder|is not the name of a file") as caught:
+    refused = r"leads out of the folder|is not the name of a file|holds a control character"
+    with pytest.raises(DataError, match=refused) as caught:
         load_vehicle(folder)
     assert caught.value.column is not None and caught.value.column.startswith(key)
     assert SECRET[:6] not in str(caught.value)
