@@ -20,7 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import casadi as ca
 
@@ -32,6 +32,8 @@ from .symbols import TableSymbols
 from .vehicle_file import NoiseLoads, VehicleFile
 
 Column = tuple[str, str, str]  # name, unit, sign
+
+NOISE_LOADS: tuple[NoiseLoads, ...] = get_args(NoiseLoads)
 
 MOVED_LINE: Column = ("center_of_pressure", "N/rad", "")  # of a load: moment for each rad and metre moved
 MOVED_MODE: Column = ("normal_force_slope_times_slope", "1/m/rad", "")  # of a mode: int c'_N dY_i/dx dx

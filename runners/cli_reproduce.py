@@ -9,7 +9,7 @@ import typer
 
 from .terminal import console, progress_bar
 
-STEPS = 40  # about as many as there are options, winds and evaluations of a calibration
+STEPS = 45  # about as many as there are options, winds and evaluations of a calibration
 
 
 def reproduce(
@@ -24,6 +24,7 @@ def reproduce(
     from .figures import write_figure
     from .output import prepare_folder, write_whole
     from .reproduction.calibration import calibrate
+    from .reproduction.mean_wind import mean_wind
     from .reproduction.options import effects
     from .reproduction.page import Reproduction, page
     from .reproduction.predictions import predict
@@ -48,7 +49,9 @@ def reproduce(
         checks = (*trajectory_checks(construction), *mass_checks(construction), *load_checks(construction))
         step("flight of AS-506")
         calibration = calibrate(vehicle, lambda text: step(f"calibration, {text}"))
-    text = page(Reproduction(predictions, found, winds, checks, calibration))
+        scaled = mean_wind(vehicle)
+        step("mean wind")
+    text = page(Reproduction(predictions, found, winds, checks, calibration, scaled))
     title = "Bending moment of AS-504 at station 25 m under different winds"
     written = write_figure(wind_figure(winds, title), out / "figures", "reproduction_winds")
     write_whole(out / "reproduction.md", lambda p: p.write_text(text, encoding="utf-8"))

@@ -7,12 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ascentwind.model.errors import DataError
+from ascentwind.model.noise_loads import NOISE_LOADS
 from ascentwind.model.shipped import built_in_vehicles
 from ascentwind.model.vehicle_file import read_vehicle_file
 from ascentwind.runners import Study, SweepOptions
 from ascentwind.runners.build.flight_checks import FlightCheck
 from ascentwind.runners.reproduction.calibration import Calibration, Input
 from ascentwind.runners.reproduction.directional import directional_derivative
+from ascentwind.runners.reproduction.mean_wind import MeanWind, WindRatio
 from ascentwind.runners.reproduction.options import Effect, Option
 from ascentwind.runners.reproduction.page import Reproduction, page
 from ascentwind.runners.reproduction.predictions import Prediction, Responses, end_times, responses
@@ -68,6 +70,20 @@ def test_first_order_change_of_wind_and_parameters_is_the_central_difference(as5
     assert first_order == pytest.approx(np.diff([moment(study, "std") for study in moved])[0], rel=1e-4)
 
 
+def test_first_order_change_of_the_mean_wind_reaches_what_the_noises_multiply(as504):
+    """A factor on the mean wind changes the mean, and through it the spread by thrust and centre of pressure."""
+    found = as504.sensitivity("bending_moment", 70.0, quantity="mean_plus_3sigma", elasticity=False)
+    moved = [as504.with_parameters({"wind.mean_scale": 1 + sign * 1e-3}) for sign in (-1, 1)]
+    first_order = np.diff([directional_derivative(found, as504, study) for study in moved])[0]
+    peaks = [
+        study.response_statistics([70.0], options=TIGHT)["mean_plus_3sigma"]
+        .sel(response="bending_moment", source="combined")
+        .item()
+        for study in moved
+    ]
+    assert first_order == pytest.approx(np.diff(peaks)[0], rel=1e-4)
+
+
 def test_studies_of_other_structure_are_not_compared(as504, as504_closed_form):
     found = as504.sensitivity("bending_moment", 70.0, source="wind", elasticity=False)
     with pytest.raises(DataError, match="other parameters or tables"):
@@ -105,7 +121,9 @@ def made_up(as504) -> Reproduction:
     ]
     check = FlightCheck("altitude", "km", 65.0, 66.1, 1.0, "table 4-2")
     predictions = [Prediction(BY_NAME["peak_mean"], 10e6), Prediction(BY_NAME["rise_attack"], 0.005)]
-    return Reproduction(predictions, effects, WindComparison({"own": statistics}, -0.07), [check], calibration)
+    forms = dict.fromkeys(NOISE_LOADS, here)
+    wind = MeanWind(1.5, 3.38, 10500.0, forms, forms, WindRatio("March 1983", 2.5, 37.0), WindRatio("May", 2.6, 38.0))
+    return Reproduction(predictions, effects, WindComparison({"own": statistics}, -0.07), [check], calibration, wind)
 
 
 def test_page_says_what_was_missed_and_what_is_at_a_bound(as504):

@@ -93,6 +93,9 @@ def inputs(correlation: tuple[float, float]) -> tuple[Input, ...]:
             True,
         ),
         Input(
+            "mean_wind", "factor on the mean wind", "1", 1.0, 0.5, 2.0, "the report's mean wind is lost; half to twice"
+        ),
+        Input(
             "wind_correlation",
             "factor on the wind's change over altitude",
             "1",
@@ -156,7 +159,8 @@ class Model:
             if p.startswith(start) and p.endswith(".damping")
         }
         times = [p for p in study.parameters if p.endswith(".correlation_time")]
-        return study.with_parameters(changes | dict.fromkeys(times, values["correlation_time"]))
+        changes |= dict.fromkeys(times, values["correlation_time"]) | {"wind.mean_scale": values["mean_wind"]}
+        return study.with_parameters(changes)
 
     def figures(self, study: Study) -> NDArray[np.float64]:
         """Return the targets."""

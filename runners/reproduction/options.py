@@ -48,6 +48,17 @@ OPTIONS = (
     Option(
         "slosh_reaction", "the bending moment holds the vehicle's answer to slosh", {"options.slosh_reaction": True}
     ),
+    Option(
+        "couple_forward",
+        "couple of a moved centre of pressure wholly forward of the station",
+        {"options.noise_loads": "couple_forward"},
+    ),
+    Option("couple_aft", "the same wholly aft of it", {"options.noise_loads": "couple_aft"}),
+    Option(
+        "noise_as_reported",
+        "thrust and centre of pressure not in 4-13 itself, as reported",
+        {"options.noise_loads": "as_reported"},
+    ),
     Option("slosh_cylinder", "slosh of flat-bottomed cylinders", construction={"slosh_method": "cylinder"}),
     Option(
         "slosh_potential", "slosh by potential flow in the tank's shape", construction={"slosh_method": "potential"}

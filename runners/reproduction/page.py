@@ -7,8 +7,10 @@ from dataclasses import dataclass
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from ...model.noise_loads import NOISE_LOADS
 from ..build.flight_checks import FlightCheck
 from .calibration import RULE, Calibration, Input
+from .mean_wind import MeanWind
 from .options import Effect
 from .predictions import BENDING, Prediction
 from .winds import WindComparison
@@ -32,6 +34,7 @@ class Reproduction:
     winds: WindComparison
     checks: Sequence[FlightCheck]
     calibration: Calibration
+    mean_wind: MeanWind
 
 
 def page(found: Reproduction) -> str:
@@ -59,6 +62,8 @@ def page(found: Reproduction) -> str:
         winds=peaks,
         checks=found.checks,
         calibration=found.calibration,
+        scaled=found.mean_wind,
+        forms=NOISE_LOADS,
         short=SHORT,
         number=number,
         published=lambda p: ("below " if p.bound == "below" else "") + number(p.value, p.unit),
@@ -119,6 +124,7 @@ def _effect_cells(effect: Effect, first: Effect) -> list[str]:
             cells.append(f"{57.29577951 * value:.2f}°")
         else:
             cells.append(_percent(value / reference - 1))
+    cells.append("" if own is None else f"{100 * own.rise_bending:.1f} %")
     return cells
 
 
