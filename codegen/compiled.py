@@ -44,6 +44,8 @@ class ExecutableSystem:
         The tables in force; their shapes are the system's.
     parameters : (n_p,) array
         Values in the order of ``system.parameters``.
+    may_compile : bool
+        Whether engines that exist as compiled code only may be compiled for it.
     """
 
     system: LinearSystem
@@ -51,6 +53,7 @@ class ExecutableSystem:
     shared_library: CompiledLibrary | None
     groups: tuple[TableGroup, ...]
     parameters: NDArray[np.float64]
+    may_compile: bool = True
 
     @cached_property
     def tables(self) -> NDArray[np.float64]:
@@ -117,7 +120,7 @@ def executable_system(system: LinearSystem, compile: bool = True) -> ExecutableS
     """
     core = core_functions(system)
     nominal = np.array([p.value for p in system.parameters])
-    interpreted = ExecutableSystem(system, core, None, system.tables, nominal)
+    interpreted = ExecutableSystem(system, core, None, system.tables, nominal, may_compile=compile)
     compiler = find_compiler() if compile else None
     if compiler is None:
         if compile:

@@ -12,7 +12,7 @@ from ..codegen.functions import state_scales
 from ..model.errors import StepBudgetError
 from .integration import Counters, Integrator, IntegratorOptions
 from .step_budget import naming_fastest_root
-from .time_nodes import interval_before, intervals, time_nodes
+from .time_nodes import Interval, interval_before, intervals, time_nodes
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,15 +90,22 @@ class AdjointSolver:
         ------
         IntegrationError, StepBudgetError
         """
-        s, system = len(self._executable.system.sources), self._executable.system
+        system = self._executable.system
         node = float(time_nodes(self._executable, [time])[0])
         scaled, G, inputs = self._terminal(node)
         scaled, quadratures, counters = self._backward(scaled, node, system.start)
+        return self._result(time, scaled, quadratures, G @ inputs, counters)
+
+    def _result(
+        self, time: float, scaled: NDArray, quadratures: NDArray, direct: NDArray, counters: Counters
+    ) -> AdjointRun:
+        """Return statistics from the adjoint at the start and the quadratures over the run, both scaled."""
+        s = len(self._executable.system.sources)
         adjoint = scaled / self._state_scale[:, None] * self._output_scale
         variance = quadratures[:, :s] * self._output_scale[:, None] ** 2
         for k, covariance in enumerate(self._start_covariance):
             variance[:, k] += np.einsum("ir,ij,jr->r", adjoint, covariance, adjoint)
-        mean = quadratures[:, s] * self._output_scale + G @ inputs
+        mean = quadratures[:, s] * self._output_scale + direct
         return AdjointRun(time, variance, mean, adjoint, counters.totals)
 
     def steps(self, adjoint: NDArray[np.float64], time: float, earliest: float) -> int:
@@ -111,32 +118,45 @@ class AdjointSolver:
         system, counters = self._executable.system, Counters()
         quadratures = np.zeros((len(system.outputs), len(system.sources) + 1))
         for interval in reversed(intervals(self._executable, earliest, time, self._longest)):
-            parameters = self._executable.integrator_parameters(
-                interval.end, interval.end - interval.begin, interval.low, interval.high
-            )
-            where = f"of the adjoint from {interval.end:g} s back to {interval.begin:g} s (t2 = {time:g} s)"
-            with naming_fastest_root(self._executable):
-                states, integrals, statistics = self._integrator.run(scaled.ravel("F"), parameters, where)
-                counters.add(statistics)
-                if counters.totals["nsteps"] > self._options.max_steps:
-                    raise StepBudgetError(self._options.max_steps, f"t = {interval.begin:.6g} s", time=interval.begin)
+            states, integrals = self._piece(scaled, interval, time, 1, counters)
+            quadratures += integrals
             scaled = states[:, -1].reshape(scaled.shape, order="F")
-            quadratures += integrals[:, -1].reshape(quadratures.shape)
         return scaled, quadratures, counters
+
+    def _piece(
+        self, scaled: NDArray, interval: Interval, time: float, points: int, counters: Counters
+    ) -> tuple[NDArray, NDArray]:
+        """Return scaled adjoints back along an interval, (n responses, points), and its quadratures; count the work."""
+        system, span = self._executable.system, interval.end - interval.begin
+        parameters = self._executable.integrator_parameters(interval.end, span, interval.low, interval.high)
+        where = f"of the adjoint from {interval.end:g} s back to {interval.begin:g} s (t2 = {time:g} s)"
+        with naming_fastest_root(self._executable):
+            states, integrals, statistics = self._integrator.run(scaled.ravel("F"), parameters, where, points)
+            counters.add(statistics)
+            if counters.totals["nsteps"] > self._options.max_steps:
+                raise StepBudgetError(self._options.max_steps, f"t = {interval.begin:.6g} s", time=interval.begin)
+        return states, integrals[:, -1].reshape(len(system.outputs), len(system.sources) + 1)
 
     def history(self, time: float, spacing: float) -> AdjointHistory:
         """Return adjoint and weighting functions at points at most ``spacing`` seconds apart."""
-        system = self._executable.system
-        (time,) = time_nodes(self._executable, [time]).tolist()
-        scaled, G, _ = self._terminal(time)
+        return self.run_with_history(time, spacing)[1]
+
+    def run_with_history(self, time: float, spacing: float) -> tuple[AdjointRun, AdjointHistory]:
+        """Return statistics and, from the same integration, adjoint and weighting functions along it.
+
+        Raises
+        ------
+        IntegrationError, StepBudgetError
+        """
+        system, counters = self._executable.system, Counters()
+        node = float(time_nodes(self._executable, [time])[0])
+        scaled, G, known = self._terminal(node)
+        quadratures = np.zeros((len(system.outputs), len(system.sources) + 1))
         times, adjoints, noise, inputs = [], [], [], []  # latest first
-        for interval in reversed(intervals(self._executable, system.start, time)):
-            span = interval.end - interval.begin
-            points = max(1, int(np.ceil(span / spacing - 1e-9)))
-            parameters = self._executable.integrator_parameters(interval.end, span, interval.low, interval.high)
-            where = f"of the adjoint from {interval.end:g} s back to {interval.begin:g} s (t2 = {time:g} s)"
-            with naming_fastest_root(self._executable):
-                states, _, _ = self._integrator.run(scaled.ravel("F"), parameters, where, points)
+        for interval in reversed(intervals(self._executable, system.start, node)):
+            points = max(1, int(np.ceil((interval.end - interval.begin) / spacing - 1e-9)))
+            states, integrals = self._piece(scaled, interval, node, points, counters)
+            quadratures += integrals
             columns = np.concatenate([scaled.ravel("F")[:, None], states], axis=1)
             at = np.linspace(interval.end, interval.begin, points + 1)
             B, E = self._executable.input_matrices(at, interval.low, interval.high)
@@ -149,4 +169,5 @@ class AdjointSolver:
             scaled = states[:, -1].reshape(scaled.shape, order="F")
         latest_first = (np.concatenate(parts) for parts in (times, adjoints, noise, inputs))
         t, adjoint, from_noise, from_inputs = (part[::-1] for part in latest_first)
-        return AdjointHistory(t, adjoint, from_noise, from_inputs, G)
+        found = self._result(time, scaled, quadratures, G @ known, counters)
+        return found, AdjointHistory(t, adjoint, from_noise, from_inputs, G)

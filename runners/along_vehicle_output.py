@@ -19,6 +19,7 @@ from ..model.errors import TimeRangeError
 from ..model.station_loads import load_station_loads
 from ..model.vehicle import Vehicle
 from .figures import COLORS, STYLE, display, words, write_figure
+from .larger_side import LABEL, larger_side
 from .moments_along_vehicle import moments_along_vehicle
 from .output import write_whole
 from .statistics import COMBINED
@@ -92,7 +93,7 @@ def along_csv(found: xr.Dataset) -> str:
 
 def along_figure(found: xr.Dataset, time: float, vehicle: Vehicle) -> Figure:
     """Return the moment over the stations at a time, its envelope over the flight, and both times and stations."""
-    factor, unit = display("N m", found["mean_plus_3sigma"].values)
+    factor, unit = display("N m", _largest(found).values)
     panels = 3 if found.sizes["time"] > 1 else 1
     with rc_context(STYLE):
         figure = Figure(figsize=(8.5, 1.2 + 3.5 * panels), layout="constrained")
@@ -107,7 +108,7 @@ def along_figure(found: xr.Dataset, time: float, vehicle: Vehicle) -> Figure:
             mesh = axes[2].pcolormesh(
                 found["station"], found["time"], factor * _largest(found), shading="gouraud", rasterized=True
             )
-            figure.colorbar(mesh, ax=axes[2], label=f"|mean| + 3σ ({unit})", pad=0.01)
+            figure.colorbar(mesh, ax=axes[2], label=f"{LABEL} ({unit})", pad=0.01)
             axes[2].axhline(time, color="white", lw=0.8, ls=":")
             axes[2].grid(False)
             axes[2].set_ylabel("flight time (s)")
@@ -154,9 +155,10 @@ def _envelope(axes: Axes, found: xr.Dataset, factor: float) -> None:
     axes.fill_between(found["station"], factor * low, factor * high, color=COLORS[COMBINED], alpha=0.12, lw=0)
     axes.plot(found["station"], factor * high, color=COLORS[COMBINED], lw=1.8, label="largest mean + 3σ")
     axes.plot(found["station"], factor * low, "--", color=COLORS[COMBINED], lw=1.8, label="least mean - 3σ")
-    axes.plot(found["station"], factor * mean.max("time"), color=COLORS["mean"], lw=1.5, label="largest mean")
+    for edge, label in ((mean.max("time"), "largest and least mean"), (mean.min("time"), None)):
+        axes.plot(found["station"], factor * edge, color=COLORS["mean"], lw=1.5, label=label)
 
 
 def _largest(found: xr.Dataset) -> xr.DataArray:
     """Return |mean| + 3 sigma from all sources, (time, station)."""
-    return abs(found["mean"]) + 3 * found["std"].sel(source=COMBINED)
+    return larger_side(found["mean"], found["std"].sel(source=COMBINED))

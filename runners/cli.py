@@ -6,7 +6,7 @@ import logging
 import sys
 import warnings
 from pathlib import Path
-from typing import Annotated, TextIO
+from typing import TYPE_CHECKING, Annotated, TextIO
 
 import typer
 from rich.logging import RichHandler
@@ -30,6 +30,11 @@ from .terminal import (
     results_folder,
     use_plain_characters,
 )
+
+if TYPE_CHECKING:
+    from .peak_check import PeakCheck
+    from .statistics import ResponseStatistics
+    from .study import Study
 
 app = typer.Typer(
     add_completion=False,
@@ -62,20 +67,27 @@ def run(
         typer.Option(help="Bending moment along the vehicle at this time (s, or 'peak'), and its envelope."),
     ] = None,
 ) -> None:
-    """Mean, variance and mean + 3 sigma of all responses over flight time: tables and figures."""
+    """Mean, variance and |mean| + 3 sigma of all responses over flight time: tables and figures.
+
+    Every peak is computed again by CVODES, one adjoint run back from it; exit code 1 when they disagree.
+    """
     from .along_vehicle_output import prepare_along_vehicle, write_along_vehicle
     from .engines import engine_options
     from .figures import response_figure, weighting_figure, words, write_figure
+    from .larger_side import LABEL
     from .manifest import Manifest
     from .output import prepare_folder, write_statistics
+    from .peak_check import weighting_at, with_peak_check
     from .study import Study
     from .times import parse_times
 
     folder = out or results_folder(vehicle, "results")
-    engine, options = engine_options(engine, method=method, relative_tolerance=tolerance)
+    settings = {"method": method, "relative_tolerance": tolerance}
+    engine_options(engine, **settings)  # refused before anything is computed
     with console.status("loading and preparing code"):
         study = Study.load(vehicle, changes=parse_changes(changes or []))
     assert study.vehicle is not None
+    engine, options = engine_options(engine, compiled=study.executable.shared_library is not None, **settings)
     end_times = parse_times(times or study.vehicle.file.default_times)
     moment_time = None if along_vehicle is None else prepare_along_vehicle(study, along_vehicle)
     families = [t for t in study.vehicle.file.weighting_times_s if study.system.start < t <= study.system.end]
@@ -91,15 +103,21 @@ def run(
         )
         manifest = Manifest.begin(folder, "run", study.system.name)
         written = write_statistics(statistics, folder)
+        progress.update(progress.add_task("peaks again by another road", total=None))
+        check = _check_peaks(study, statistics)
+        if check is not None:
+            statistics = with_peak_check(statistics, check, study)
+            write_statistics(statistics, folder)
+            families = sorted({*families, *(p.time for p in check.peaks[:1] if p.time > study.system.start)})
         task = progress.add_task("figures", total=len(statistics["response"]) + len(families) + 1)
         for output in study.system.outputs:
-            title = f"{study.vehicle.title}\n{words(output.name).capitalize()}, mean and mean + 3σ"
+            title = f"{study.vehicle.title}\n{words(output.name).capitalize()}, mean and {LABEL}"
             figure = response_figure(statistics, output.name, title)
             written += write_figure(figure, folder, output.name)
             progress.advance(task)
         weighting = []
         for t in families:
-            weighting.append(study.weighting_function(t))
+            weighting.append(study.weighting_function(t) if check is None else weighting_at(study, check, t))
             progress.advance(task)
         if weighting:
             first = study.system.outputs[0]
@@ -117,20 +135,40 @@ def run(
     console.print(f"{len(written)} files in {folder}: {', '.join(p.name for p in written)}", soft_wrap=True)
     for sentence in manifest.finish(written):
         console.print(sentence, style="dim", soft_wrap=True, markup=False)
+    agree = check is not None and check.agree
+    if check is not None:
+        console.print(
+            check.verdict(), style="green" if agree else "bold red", markup=False, highlight=False, soft_wrap=True
+        )
+    if not agree:
+        raise typer.Exit(1)
+
+
+def _check_peaks(study: Study, statistics: ResponseStatistics) -> PeakCheck | None:
+    """Hold the peaks of written results against another road; where it fails say so, so that nothing is lost."""
+    from .peak_check import check_peaks
+
+    try:
+        return check_peaks(study, statistics)
+    except AscentwindError as error:
+        text = f"The peaks could not be computed a second time, by another road, and stand unchecked: {error}"
+        errors.print(text, style="bold red", markup=False, highlight=False, soft_wrap=True)
+        return None
 
 
 def _print_peaks(statistics) -> None:
     from .figures import display, words
+    from .larger_side import LABEL
     from .peaks import peaks
 
     found = peaks(statistics)
-    table = Table("response", title="Peaks of mean + 3 sigma")
-    for column in ("time", "mean + 3σ", "mean", "σ"):
+    table = Table("response", title=f"Peaks of {LABEL}")
+    for column in ("time", LABEL, "side", "mean", "σ"):
         table.add_column(column, justify="right", no_wrap=True)
     for peak in found:
         factor, unit = display(peak.unit, peak.value)
-        numbers = (f"{factor * x:.4g} {unit}" for x in (peak.value, peak.mean, peak.std))
-        table.add_row(words(peak.response), f"{peak.time:g} s{'*' if peak.at_end else ''}", *numbers)
+        value, mean, std = (f"{factor * x:.4g} {unit}" for x in (peak.value, peak.mean, peak.std))
+        table.add_row(words(peak.response), f"{peak.time:g} s{'*' if peak.at_end else ''}", value, peak.side, mean, std)
     console.print(table)
     table = Table("response", title="Share of the variance at the peak")
     for source in found[0].shares:

@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from ..model.errors import DataError
+from .larger_side import LARGER_SIDE
 from .terminal import VehicleArgument, console, progress_bar, results_folder
 
 WIDE = 150  # columns: tables that a narrow terminal wraps but a file keeps whole
@@ -20,7 +21,9 @@ def sensitivity(
     response: Annotated[str | None, typer.Option(help="Response; the vehicle's first without it.")] = None,
     time: Annotated[str, typer.Option(help="End time in s, or 'peak'.")] = "peak",
     source: Annotated[str, typer.Option(help="A noise source, or 'combined'.")] = "combined",
-    quantity: Annotated[str, typer.Option(help="std, variance, mean or mean_plus_3sigma.")] = "mean_plus_3sigma",
+    quantity: Annotated[
+        str, typer.Option(help=f"{LARGER_SIDE}, mean_plus_3sigma, mean, std or variance.")
+    ] = LARGER_SIDE,
     out: Annotated[Path | None, typer.Option(help="Folder for results; VEHICLE-sensitivity without it.")] = None,
 ) -> None:
     """Which parameter, second of a table and kilometre of wind drives a response: exact derivatives, ranked."""

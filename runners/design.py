@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 
 from ..model.errors import UnknownNameError
 from .adjoint import AdjointSolver
+from .design_peaks import SIGNS
 from .design_problem import DesignProblemError, LoadReliefProblem, family_words
 from .design_search import ACTIVE, Search, Stationarity
 from .integration import IntegratorOptions
+from .larger_side import larger_side, side
 from .mean_response import with_mean_tables
 from .study import Study
 
@@ -56,6 +58,8 @@ class Quantity:
     time_before, time_after : float
         End time or frozen time of the peak or of the least damping, s.
     limit : float or None
+    side : str
+        Of a peak: the side on which it lies after the design.
     """
 
     name: str
@@ -65,6 +69,7 @@ class Quantity:
     time_before: float
     time_after: float
     limit: float | None = None
+    side: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,7 +202,7 @@ def verify_design(result: DesignResult, relative_tolerance: float = 1e-11) -> li
         run = solver.run(problem.times[k])
         for r in np.flatnonzero(near[:, k]):
             row = study.system.output_index(responses[r])
-            value = abs(run.mean[row]) + 3 * np.sqrt(run.variance[row].sum())
+            value = larger_side(float(run.mean[row]), float(np.sqrt(run.variance[row].sum())))
             found.append(Verification(responses[r], problem.times[k], float(largest[r, k]), float(value)))
     return found
 
@@ -267,7 +272,17 @@ def _quantities(search: Search, before: NDArray[np.float64], after: NDArray[np.f
         largest = [p.peaks[r].max(axis=0) for p in points]
         times = [problem.times[int(np.argmax(x))] for x in largest]
         heights = [float(x.max()) for x in largest]
-        found.append(Quantity(f"peak {response}", unit, *heights, *times, limit=problem.peak_limits.get(response)))
+        after_by_sign = points[1].peaks[r].max(axis=1)
+        found.append(
+            Quantity(
+                f"peak {response}",
+                unit,
+                *heights,
+                *times,
+                limit=problem.peak_limits.get(response),
+                side=side(SIGNS[int(np.argmax(after_by_sign))]),
+            )
+        )
     frozen = [p.frozen for p in points if p.frozen is not None]
     if search.roots and len(frozen) == len(points):
         for f, family in enumerate(search.families):

@@ -30,7 +30,7 @@ def print_design(result: DesignResult, verified: Sequence[Verification], console
     for quantity in result.quantities:
         factor, unit = display(quantity.unit, quantity.before)
         unit = f" {unit}".removesuffix(" 1")
-        at = f" at {quantity.time_after:g} s"
+        at = f" at {quantity.time_after:g} s" + (f", {quantity.side}" if quantity.side else "")
         limit = "" if quantity.limit is None else f"{factor * quantity.limit:.4g}{unit}"
         table.add_row(
             words(quantity.name),

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ..codegen.node_functions import node_functions
 from ..model.errors import IntegrationError, UnstableSystemWarning
 from .flight_nodes import FlightNodes
+from .larger_side import SIGMAS
 from .sensitivity_gradient import AdjointPair
 from .statistics import COMBINED
 from .sweep_engine import SweepOptions
@@ -38,7 +39,7 @@ def three_sigma(study: Study, responses: list[str], times: tuple[float, ...]) ->
         except IntegrationError:
             return None
     mean, std = (found[name].sel(source=COMBINED).values.T for name in ("mean", "std"))
-    values = np.stack([3 * std + sign * mean for sign in SIGNS], axis=1)
+    values = np.stack([SIGMAS * std + sign * mean for sign in SIGNS], axis=1)
     return values if np.isfinite(values).all() else None
 
 
@@ -55,5 +56,5 @@ def gradients(study: Study, rows: Iterable[Row], parameters: tuple[str, ...]) ->
     found = {}
     for response, sign, time in rows:
         pair = pairs[response, time]
-        found[response, sign, time] = pair.gradient(1.5 / np.sqrt(pair.variance), sign).parameters[columns]
+        found[response, sign, time] = pair.gradient(0.5 * SIGMAS / np.sqrt(pair.variance), sign).parameters[columns]
     return found

@@ -61,10 +61,10 @@ def find_engine(name: str) -> Engine:
     return ENGINES[name]
 
 
-def engine_options(name: str | None, **settings: object) -> tuple[str | None, object | None]:
+def engine_options(name: str | None, *, compiled: bool = True, **settings: object) -> tuple[str | None, object | None]:
     """Return an engine and its options from what a person named; None leaves the choice to the study.
 
-    ``method`` alone means CVODES, and ``relative_tolerance`` alone the sweep.
+    ``method`` alone means CVODES, and ``relative_tolerance`` alone the sweep, or CVODES where nothing is compiled.
 
     Raises
     ------
@@ -72,7 +72,7 @@ def engine_options(name: str | None, **settings: object) -> tuple[str | None, ob
     """
     given = {key: value for key, value in settings.items() if value is not None}
     if name is None and given:
-        name = "cvodes" if "method" in given else "sweep"
+        name = "cvodes" if "method" in given or not compiled else "sweep"
     if name is None:
         return None, None
     takes = {field.name for field in fields(find_engine(name).options)}
@@ -145,7 +145,7 @@ def _cvodes(
 def _sweep(
     study: Study, times: list[float], responses: list[str], options: SweepOptions, progress: Progress | None
 ) -> ResponseStatistics:
-    engine = sweep_of(study.system)
+    engine = sweep_of(study.executable)
     found = sweep(
         engine,
         study.with_means,
@@ -195,14 +195,19 @@ def _with_covariance(dataset: ResponseStatistics, covariance: np.ndarray, rows: 
 
 
 def batch_dataset(
-    study: Study, found: list[SweepResult], responses: list[str], options: SweepOptions
+    study: Study,
+    times: list[float],
+    members: list[tuple[np.ndarray, np.ndarray]],
+    engine: str,
+    relative_tolerance: float,
 ) -> ResponseStatistics:
-    """Return the dataset of a batch: statistics with a dimension ``member`` in front."""
-    rows = [study.system.output_index(name) for name in responses]
-    attributes = provenance(study) | {"engine": "sweep", "relative_tolerance": options.relative_tolerance}
-    mean = np.array([member.mean[:, rows] for member in found])
-    variance = np.array([member.variance[:, rows] for member in found])
-    return statistics_dataset(study, found[0].times.tolist(), responses, mean, variance, attributes)
+    """Return the dataset of a batch: statistics of all responses with a dimension ``member`` in front.
+
+    ``members`` are means (k, responses) and variances (k, responses, sources).
+    """
+    attributes = provenance(study) | {"engine": engine, "relative_tolerance": relative_tolerance}
+    mean, variance = (np.array(values) for values in zip(*members, strict=True))
+    return statistics_dataset(study, times, list(study.system.output_names), mean, variance, attributes)
 
 
 def _covariance(

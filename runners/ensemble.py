@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2, t
 
 from ..codegen.compiled import ExecutableSystem
-from ..codegen.ensemble import compiled_ensemble
+from ..codegen.ensemble import EnsembleNeedsCompilerError, compiled_ensemble
 from ..codegen.interruption import Workers
 from ..model.errors import AscentwindError
 from .cores import available_cores
@@ -135,6 +135,11 @@ def run_ensemble(executable: ExecutableSystem, times: list[float], options: Ense
     EnsembleNeedsCompilerError, CompilerError, IntegrationError
     """
     system = executable.system
+    if not executable.may_compile:
+        raise EnsembleNeedsCompilerError(
+            f"'{system.name}' was loaded with compile=False, and the ensemble exists as compiled code only; load it "
+            "without compile=False, or take another engine"
+        )
     grid = np.asarray(times, float)
     if options.paths:
         count = max(1, int(np.ceil((times[-1] - system.start) / options.path_spacing - 1e-9)))

@@ -17,7 +17,9 @@ from matplotlib.ticker import FixedFormatter, FuncFormatter, NullFormatter
 from numpy.typing import ArrayLike
 
 from ..model.names import file_name
+from .larger_side import LABEL, SIGMAS, sign
 from .output import write_whole
+from .peaks import peaks
 from .statistics import COMBINED, ResponseStatistics
 from .tolerance import Measurement, Pace
 
@@ -66,18 +68,20 @@ def words(name: str) -> str:
 
 
 def response_figure(statistics: ResponseStatistics, response: str, title: str) -> Figure:
-    """Return mean, mean + 3 sigma from the first source alone, and from all, over flight time."""
+    """Return the mean, and the side of the peak of |mean| + 3 sigma from the first source and from all, over time."""
     part = statistics.sel(response=response)
-    factor, unit = display(str(part["unit"].item()), part["mean_plus_3sigma"])
+    (peak,) = peaks(statistics.sel(response=[response]))
+    factor, unit = display(peak.unit, peak.value)
     first = str(statistics["source"].values[0])
     time = statistics["time"].values
+    toward = part["mean"] + sign(peak.mean) * SIGMAS * part["std"]
     with rc_context(STYLE):
         figure = Figure(layout="constrained")
         axes = figure.subplots()
         curves = (
             ("mean", part["mean"].sel(source=COMBINED), "mean", "-"),
-            ("wind", part["mean_plus_3sigma"].sel(source=first), f"mean + 3σ, {words(first)} alone", "-"),
-            (COMBINED, part["mean_plus_3sigma"].sel(source=COMBINED), "mean + 3σ, all sources", "--"),
+            ("wind", toward.sel(source=first), f"{peak.side}, {words(first)} alone", "-"),
+            (COMBINED, toward.sel(source=COMBINED), f"{peak.side}, all sources", "--"),
         )
         marker = "o" if time.size < 3 else None
         mean, sigma = part["mean"].sel(source=COMBINED), part["std"].sel(source=COMBINED)
@@ -87,12 +91,10 @@ def response_figure(statistics: ResponseStatistics, response: str, title: str) -
         )  # fmt: skip
         for color, values, label, line in curves:
             axes.plot(time, factor * values, line, color=COLORS[color], label=label, lw=2, marker=marker)
-        total = part["mean_plus_3sigma"].sel(source=COMBINED)
-        peak = int(np.argmax(total.values))
         axes.annotate(
-            f"{factor * float(total[peak]):.3g} {unit} at {time[peak]:g} s",
-            (time[peak], factor * float(total[peak])),
-            xytext=(12, 4),
+            f"{LABEL}: {factor * peak.value:.3g} {unit} at {peak.time:g} s",
+            (peak.time, factor * sign(peak.mean) * peak.value),
+            xytext=(12, 4 * sign(peak.mean)),
             textcoords="offset points",
             color=COLORS[COMBINED],
         )

@@ -1,4 +1,4 @@
-"""Peaks of mean + 3 sigma over the end times, and what drives them."""
+"""Peaks of |mean| + 3 sigma over the end times, and what drives them."""
 
 from __future__ import annotations
 
@@ -6,17 +6,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .larger_side import larger_side, side
 from .statistics import COMBINED, ResponseStatistics
 
 
 @dataclass(frozen=True)
 class Peak:
-    """The largest mean + 3 sigma of a response.
+    """The largest |mean| + 3 sigma of a response.
 
     Attributes
     ----------
-    value, mean, std : float
-        At ``time``, SI.
+    value : float
+        |mean| + 3 sigma at ``time``, SI.
+    mean, std : float
+        There, SI; the mean with its sign.
     shares : dict of source to float
         Part of the variance; they add up to one.
     at_end : bool
@@ -32,13 +35,18 @@ class Peak:
     shares: dict[str, float]
     at_end: bool
 
+    @property
+    def side(self) -> str:
+        """Name of the side on which the peak lies."""
+        return side(self.mean)
+
 
 def peaks(statistics: ResponseStatistics) -> list[Peak]:
     """Return the peak of every response."""
     found = []
     times, sources = statistics["time"].values, [str(s) for s in statistics["source"].values]
     for r, response in enumerate(statistics["response"].values):
-        total = statistics["mean_plus_3sigma"].sel(source=COMBINED).values[:, r]
+        total = larger_side(*(statistics[name].sel(source=COMBINED).values[:, r] for name in ("mean", "std")))
         k = int(np.argmax(total))
         at = statistics.isel(time=k, response=r)
         variance = dict(zip(sources, at["variance"].values.tolist(), strict=True))

@@ -15,6 +15,7 @@ from ..codegen.node_functions import node_functions
 from ..model.errors import AscentwindError, AscentwindWarning, SwitchError, TimeRangeError, UnknownNameError
 from ..model.system import LinearSystem
 from .flight_nodes import FlightNodes
+from .larger_side import LARGER_SIDE, larger_side, sign
 from .sensitivity_gradient import AdjointPair, Gradient
 from .sensitivity_peak import peak_time
 from .sensitivity_tables import Parts, table_sensitivities, total_density
@@ -27,7 +28,7 @@ from .times import seconds
 if TYPE_CHECKING:
     from .study import Study
 
-QUANTITIES: tuple[str, ...] = ("std", "variance", "mean", "mean_plus_3sigma")
+QUANTITIES: tuple[str, ...] = (LARGER_SIDE, "std", "variance", "mean", "mean_plus_3sigma")
 STRUCTURAL = re.compile(
     r"^(options|events)\.|(count|number|order|synthesis|modes?|tanks?|masses|sources?|states?|loads?|outputs?)$"
 )
@@ -126,7 +127,9 @@ class Request:
                 "has no derivative; ask for quantity 'variance', or for a source with a sigma above zero"
             )
         root = 0.5 / np.sqrt(pair.variance)
-        return (root, 0.0) if self.quantity == "std" else (3 * root, 1.0)
+        if self.quantity == "std":
+            return root, 0.0
+        return 3 * root, sign(pair.mean) if self.quantity == LARGER_SIDE else 1.0
 
     def curvature(self, pair: AdjointPair) -> float:
         """Return d2Q/dVar2."""
@@ -137,7 +140,17 @@ class Request:
     def value(self, variance: float, mean: float) -> float:
         """Return the quantity."""
         std = float(np.sqrt(max(variance, 0.0)))
-        return {"std": std, "variance": variance, "mean": mean, "mean_plus_3sigma": mean + 3 * std}[self.quantity]
+        return {
+            LARGER_SIDE: float(larger_side(mean, std)),
+            "std": std,
+            "variance": variance,
+            "mean": mean,
+            "mean_plus_3sigma": mean + 3 * std,
+        }[self.quantity]
+
+    def sought(self, variance: float, mean: float) -> float:
+        """Return what is largest at the peak: the quantity, of the mean its size."""
+        return abs(mean) if self.quantity == "mean" else self.value(variance, mean)
 
 
 def sensitivity(

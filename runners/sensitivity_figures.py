@@ -9,20 +9,22 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from .figures import COLORS, STYLE, display, words
+from .larger_side import LABEL, LARGER_SIDE, side
 from .statistics import COMBINED
 
 BARS = 14
 CURVES = 6
 EARLIER = 30.0  # s before t2 that the curves show
 SHADES = ("#1f6fb4", "#c8442c", "#3a8f4d", "#8e5bb5", "#c98a1b", "#444444")
-LABELS = {"std": "σ", "variance": "variance", "mean": "mean", "mean_plus_3sigma": "mean + 3σ"}
+LABELS = {LARGER_SIDE: LABEL, "std": "σ", "variance": "variance", "mean": "mean", "mean_plus_3sigma": "mean + 3σ"}
 
 
 def heading(found: xr.Dataset) -> str:
-    """Return what was differentiated, in words: '24.7 MN m mean + 3σ bending moment at 74.7 s'."""
+    """Return what was differentiated, in words: '|mean| + 3σ (mean + 3σ) bending moment at 74.7 s: 24.7 MN m'."""
     a = found.attrs
     source = "" if a["source"] == COMBINED else f" from {words(a['source'])} alone"
-    what = f"{LABELS[a['quantity']]} {words(a['response'])}{source} at {a['t2_s']:.4g} s"
+    label = LABELS[a["quantity"]] + (f" ({side(a['mean'])})" if a["quantity"] == LARGER_SIDE else "")
+    what = f"{label} {words(a['response'])}{source} at {a['t2_s']:.4g} s"
     if a["quantity"] == "variance":
         return what
     factor, unit = display(a["response_unit"], a["value"])

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.optimize import root_scalar
 
 from ..model.errors import TimeRangeError
+from .larger_side import sign
 from .time_nodes import beyond
 from .times import parse_times
 
@@ -25,7 +26,7 @@ TIME_TOLERANCE = 1e-6  # s
 
 
 def peak_time(study: Study, request: Request) -> tuple[float, bool]:
-    """Return the time of the largest value of a quantity, and whether it is an end of the range searched.
+    """Return the time of the largest value of a quantity, of the mean its size, and whether it is an end of the range.
 
     The range is a vehicle's ``default_times``, or start to end of a system of your own.
 
@@ -36,16 +37,18 @@ def peak_time(study: Study, request: Request) -> tuple[float, bool]:
     """
     times = _range(study)
     scan = study.response_statistics(times, responses=[request.response])
-    values = scan[request.quantity].sel(source=request.source).values[:, 0]
-    best = int(np.argmax(values))
+    mean, variance = (scan[name].sel(source=request.source).values[:, 0] for name in ("mean", "variance"))
+    best = int(np.argmax([request.sought(float(v), float(m)) for v, m in zip(variance, mean, strict=True)]))
     low, high = times[max(best - 1, 0)], times[min(best + 1, len(times) - 1)]
 
     @lru_cache
     def quantity(time: float) -> tuple[float, float]:
         pair = request.pair(study, time)
         on_variance, on_mean = request.factors(pair)
+        if request.quantity == "mean":
+            on_mean *= sign(pair.mean)
         variance, mean = pair.slopes
-        return request.value(pair.variance, pair.mean), on_variance * variance + on_mean * mean
+        return request.sought(pair.variance, pair.mean), on_variance * variance + on_mean * mean
 
     candidates = [times[best]]
     switches = study.executable.stops(high).times.tolist()

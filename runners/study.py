@@ -6,12 +6,14 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
 import xarray as xr
 
 from ..model.errors import ParameterValueError
 from .adjoint import AdjointSolver
 from .engines import Progress, batch_dataset, compute_statistics
 from .integration import IntegratorOptions
+from .mean_response import with_mean_tables
 from .second_derivatives import second_derivatives
 from .sensitivity import sensitivity
 from .sensitivity_check import check_sensitivity
@@ -98,6 +100,8 @@ class Study(StudyNumbers):
     ) -> ResponseStatistics:
         """Return the statistics for many sets of parameter values by the sweep, on all cores.
 
+        Where nothing is compiled, CVODES computes one set after another.
+
         Parameters
         ----------
         parameter_sets : sequence of mappings
@@ -105,9 +109,9 @@ class Study(StudyNumbers):
         times : iterable of float
             End times t2, s.
         options : SweepOptions, optional
-            Relative tolerance 1e-4 without it.
+            Relative tolerance 1e-4 without it; names the sweep, which needs a compiler.
         threads : int, optional
-            All cores without it.
+            All cores without it; names the sweep too.
 
         Returns
         -------
@@ -123,17 +127,28 @@ class Study(StudyNumbers):
         self._require_linear_mean("a batch")
         ends = end_times(times)
         self._check_times(ends)
-        options = options or SweepOptions(relative_tolerance=1e-4)
+        self._responses(None)
         values = [self._parameter_values(changes) for changes in parameter_sets]
+        if self.executable.shared_library is None and options is None and threads is None:
+            by_cvodes = IntegratorOptions()
+            members = []
+            for numbers in values:
+                member = with_mean_tables(self.executable.with_numbers(parameters=numbers))
+                solver = AdjointSolver(member, by_cvodes)
+                runs = [solver.run(time) for time in ends]
+                members.append((np.array([run.mean for run in runs]), np.array([run.variance for run in runs])))
+            return batch_dataset(self, ends, members, "cvodes", by_cvodes.relative_tolerance)
+        options = options or SweepOptions(relative_tolerance=1e-4)
         found = batch(
-            sweep_of(self.system),
+            sweep_of(self.executable),
             self.executable,
             values,
             ends,
             relative_tolerance=options.relative_tolerance,
             threads=threads,
         )
-        return batch_dataset(self, found, self._responses(None), options)
+        members = [(member.mean, member.variance) for member in found]
+        return batch_dataset(self, ends, members, "sweep", options.relative_tolerance)
 
     def weighting_functions(
         self, times: Iterable[float], *, spacing: float = 0.25, options: SweepOptions | None = None
@@ -157,7 +172,7 @@ class Study(StudyNumbers):
         self._check_spacing(spacing)
         tolerance = (options or SweepOptions()).relative_tolerance
         found = sweep(
-            sweep_of(self.system),
+            sweep_of(self.executable),
             self.with_means,
             ends,
             relative_tolerance=tolerance,
@@ -206,10 +221,12 @@ class Study(StudyNumbers):
         ----------
         response : str
         time : float or 'peak'
-            t2, s; 'peak' is the time at which the quantity is largest, located between output times.
+            t2, s; 'peak' is the time at which the quantity, or the size of the mean, is largest, located between
+            output times.
         source : str
             A noise source, or 'combined'.
-        quantity : {'std', 'variance', 'mean', 'mean_plus_3sigma'}
+        quantity : {'std', 'variance', 'mean', 'mean_plus_3sigma', 'abs_mean_plus_3sigma'}
+            The last is |mean| + 3 sigma, the larger of both sides; the one before is literal.
         parameters : iterable of str, optional
             All without it.
         elasticity : bool

@@ -147,7 +147,7 @@ class StudyNumbers:
         """The system with its tables of the mean response filled in by the linear mean."""
         if self.executable.shared_library is None:
             return with_mean_tables(self.executable)
-        return with_sweep_mean_tables(sweep_of(self.system), self.executable)
+        return with_sweep_mean_tables(sweep_of(self.executable), self.executable)
 
     @cached_property
     def with_means(self) -> ExecutableSystem:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..codegen.compiled import ExecutableSystem
 from ..codegen.interruption import Workers
-from ..codegen.sweep import CompiledSweep, Segments, compiled_sweep
+from ..codegen.sweep import CompiledSweep, NoCompilerError, Segments, compiled_sweep
 from ..model.errors import AscentwindError, IntegrationError, TimeRangeError
 from ..model.system import LinearSystem
 from .cores import available_cores
@@ -47,15 +47,24 @@ class SweepOptions:
             )
 
 
-@lru_cache(maxsize=16)
-def sweep_of(system: LinearSystem) -> CompiledSweep:
+def sweep_of(executable: ExecutableSystem) -> CompiledSweep:
     """Return the compiled sweep of a system, the same one for every study of it.
 
     Raises
     ------
-    NoCompilerError, CompilerError, CacheError
+    NoCompilerError
+        Without a compiler, or for a system that is not to be compiled.
+    CompilerError, CacheError
     """
-    return compiled_sweep(system)
+    if not executable.may_compile:
+        raise NoCompilerError(
+            f"'{executable.system.name}' was loaded with compile=False, and the sweep exists as compiled code only; "
+            "use engine='cvodes', or load it without compile=False"
+        )
+    return _sweep_of(executable.system)
+
+
+_sweep_of = lru_cache(maxsize=16)(compiled_sweep)
 
 
 @dataclass(frozen=True, eq=False)

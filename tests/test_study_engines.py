@@ -8,7 +8,7 @@ from ascentwind.codegen.sweep import NoCompilerError
 from ascentwind.model.errors import IntegrationError, ParameterValueError, UnknownNameError
 from ascentwind.runners import IntegratorOptions, Study, SweepOptions
 from ascentwind.runners.engines import engine_options
-from ascentwind.runners.sweep_engine import sweep_of
+from ascentwind.runners.sweep_engine import _sweep_of
 
 TIMES = (30.0, 75.0, 105.6, 134.34, 140.0)
 
@@ -83,7 +83,7 @@ def test_engines_are_chosen_by_name_and_refuse_what_they_do_not_take(as504):
 
 def test_without_a_compiler_cvodes_is_the_default(monkeypatch):
     monkeypatch.setenv("CC", "")
-    sweep_of.cache_clear()
+    _sweep_of.cache_clear()
     study = Study.load("as504", compile=False)
     assert study.response_statistics([15.0]).attrs["engine"] == "cvodes"
     with pytest.raises(NoCompilerError, match="engine='cvodes'"):

@@ -49,8 +49,8 @@ def reported(study, given: dict, folder: Path, columns: int = 80) -> SimpleNames
 
 
 def upper(stored: xr.Dataset) -> np.ndarray:
-    """Return mean + 3 sigma of the members, (member, time)."""
-    return (stored["mean"] + 3 * stored["std"].sel(source="combined")).sel(response="x").values
+    """Return |mean| + 3 sigma of the members, (member, time)."""
+    return (abs(stored["mean"]) + 3 * stored["std"].sel(source="combined")).sel(response="x").values
 
 
 def labelled(figure: Figure) -> tuple[str, ...]:
@@ -74,7 +74,7 @@ def test_spread_csv_is_what_numpy_makes_of_the_stored_members(dispersed):
     stored, rows = dispersed.stored, {r["measure"]: r for r in dispersed.tables["spread.csv"]}
     at = int(np.argmax((stored["nominal_mean"] + 3 * stored["nominal_std"].sel(source="combined")).values[:, 0]))
     mean, std = stored["mean"].values[:, at, 0], stored["std"].sel(source="combined").values[:, at, 0]
-    samples = {"peak": upper(stored).max(axis=1), "mean_plus_3sigma": mean + 3 * std, "mean": mean, "std": std}
+    samples = {"peak": upper(stored).max(axis=1), "abs_mean_plus_3sigma": mean + 3 * std, "mean": mean, "std": std}
     assert rows.keys() == samples.keys()
     for measure, sample in samples.items():
         row = {k: float(v) for k, v in rows[measure].items() if k not in ("measure", "response", "unit") and v}
@@ -99,8 +99,8 @@ def test_spread_csv_is_what_numpy_makes_of_the_stored_members(dispersed):
 def test_first_order_in_spread_csv_is_the_closed_form(dispersed):
     """mean = gain level m and sigma = gain s: the spread of each by both quantities."""
     mean, std = closed_form(3.0)
-    by_gain = {"mean": mean / GAIN, "std": std / GAIN, "mean_plus_3sigma": (mean + 3 * std) / GAIN}
-    by_level = {"mean": mean / INPUT, "std": 0.0, "mean_plus_3sigma": mean / INPUT}
+    by_gain = {"mean": mean / GAIN, "std": std / GAIN, "abs_mean_plus_3sigma": (mean + 3 * std) / GAIN}
+    by_level = {"mean": mean / INPUT, "std": 0.0, "abs_mean_plus_3sigma": mean / INPUT}
     rows = {r["measure"]: r for r in dispersed.tables["spread.csv"]}
     for measure, slope in by_gain.items():
         expected = np.hypot(slope * 0.3, by_level[measure] * 0.2)
@@ -113,7 +113,7 @@ def test_members_csv_holds_every_member(dispersed):
     peak, times = upper(stored), stored["time"].values
     for m in (0, 7, 299):
         assert float(rows[m]["gain (1)"]) == pytest.approx(stored["value"].values[m, 0], rel=1e-9)
-        assert float(rows[m]["peak mean + 3 sigma of x (1)"]) == pytest.approx(peak[m].max(), rel=1e-9)
+        assert float(rows[m]["peak |mean| + 3 sigma of x (1)"]) == pytest.approx(peak[m].max(), rel=1e-9)
         assert float(rows[m]["at (s), x"]) == times[np.argmax(peak[m])]
         assert (rows[m]["member"], rows[m]["status"], rows[m]["reason"]) == (str(m), "computed", "")
 
@@ -136,7 +136,7 @@ def test_histogram_shows_members_and_first_order(dispersed):
     found = spread(dispersed.result)
     figure = histogram_figure(dispersed.result, measures(dispersed.result), found, "x")
     assert labelled(figure) == (
-        "peak of mean + 3σ x (1)", "density (1/1)", "peak of mean + 3σ x (1)", "members below (%)"
+        "peak of |mean| + 3σ x (1)", "density (1/1)", "peak of |mean| + 3σ x (1)", "members below (%)"
     )  # fmt: skip
     peak = np.sort(upper(dispersed.stored).max(axis=1))
     (bars,) = figure.axes[0].patches
@@ -154,7 +154,7 @@ def test_histogram_shows_members_and_first_order(dispersed):
 
 def test_band_shows_percentiles_over_time(dispersed):
     figure = band_figure(dispersed.result, spread(dispersed.result), "x")
-    assert labelled(figure) == ("flight time (s)", "mean + 3σ x (1)")
+    assert labelled(figure) == ("flight time (s)", "|mean| + 3σ x (1)")
     values, times = upper(dispersed.stored), dispersed.stored["time"].values
     x, median = line(figure, "median")
     np.testing.assert_allclose(x, times)
@@ -236,7 +236,7 @@ def test_tornado_bars_are_the_changes(swept):
     (axes,) = figure.axes
     mean, std = closed_form(3.0)
     peak = mean + 3 * std
-    assert axes.get_xlabel() == f"change of the peak mean + 3σ x from {peak:.4g} 1 (1)"
+    assert axes.get_xlabel() == f"change of the peak |mean| + 3σ x from {peak:.4g} 1 (1)"
     names = [text.get_text() for text in axes.get_yticklabels()]
     assert names == ["gain\n2 … 4.5", "tau\n-5 … 2.2", "level\n1.4 … 1.6"]  # the largest on top
     low, high = ([bar.get_width() for bar in container] for container in axes.containers)
@@ -254,7 +254,7 @@ def test_grids_are_shown_at_their_values(study, tmp_path):
     gain, tau = ({"name": "gain", "values": [4.0, 2.0]}, {"name": "tau", "values": [1.0, 0.0, 3.0, -5.0]})
     one = reported(study, plan(grid={"quantity": [tau]}), tmp_path / "one")
     figure = grid_figure(one.result, measures(one.result), "x")
-    assert labelled(figure) == ("tau", "peak mean + 3σ x (1)")
+    assert labelled(figure) == ("tau", "peak |mean| + 3σ x (1)")
     expected = [sum(np.array(closed_form(3.0, value)) * (1, 3)) for value in (1.0, 3.0)]
     x, y = line(figure, "computed")
     np.testing.assert_allclose(x, [-5.0, 0.0, 1.0, 3.0])
@@ -263,14 +263,14 @@ def test_grids_are_shown_at_their_values(study, tmp_path):
     assert line(figure, "unstable")[0].tolist() == [-5.0]
     two = reported(study, plan(grid={"quantity": [gain, tau]}), tmp_path / "two")
     assert two.tables["members.csv"][1]["status"] == "failed"
-    assert two.tables["members.csv"][1]["peak mean + 3 sigma of x (1)"] == ""
+    assert two.tables["members.csv"][1]["peak |mean| + 3 sigma of x (1)"] == ""
     largest = max(
-        float(r["peak mean + 3 sigma of x (1)"]) for r in two.tables["members.csv"] if r["status"] != "failed"
+        float(r["peak |mean| + 3 sigma of x (1)"]) for r in two.tables["members.csv"] if r["status"] != "failed"
     )
     assert re.search(rf"largest │ +{largest:.4g} │ +4 │ +-5 │", two.text)
     figure = grid_figure(two.result, measures(two.result), "x")
     assert labelled(figure)[:2] == ("gain", "tau")
-    assert "peak mean + 3σ x (1)" in labelled(figure)
+    assert "peak |mean| + 3σ x (1)" in labelled(figure)
     assert line(figure, "nominal").ravel().tolist() == [GAIN, TAU]
     (contours,) = figure.axes[0].collections
     highest = [path for path in contours.get_paths() if len(path.vertices)][-1]
@@ -290,7 +290,7 @@ def test_every_response_gets_its_files(as504, tmp_path):
     assert all(p.stat().st_size > 10_000 for p in written if p.suffix == ".png")
     for response, label, factor in (("bending_moment", "MN m", 1e-6), ("engine_angle", "deg", 180 / np.pi)):
         figure = grid_figure(result, measures(result), response)
-        assert labelled(figure) == ("reference_area (m2)", f"peak mean + 3σ {response.replace('_', ' ')} ({label})")
+        assert labelled(figure) == ("reference_area (m2)", f"peak |mean| + 3σ {response.replace('_', ' ')} ({label})")
         part = result.data.sel(response=response)
-        peaks = (part["mean"] + 3 * part["std"].sel(source="combined")).values.max(axis=1)
+        peaks = (abs(part["mean"]) + 3 * part["std"].sel(source="combined")).values.max(axis=1)
         np.testing.assert_allclose(line(figure, "computed")[1], factor * peaks)

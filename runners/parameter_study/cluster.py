@@ -249,7 +249,7 @@ def _identity(study: Study) -> dict[str, str]:
         "casadi": ca.CasadiMeta.version(),
         "numpy": np.__version__,
         "data": data_hash(study),
-        "code": sweep_of(study.system).shared_library.key,
+        "code": sweep_of(study.executable).shared_library.key,
     }
 
 

@@ -89,7 +89,7 @@ def compute_chunk(study: Study, task: Task, chunk: Chunk) -> ChunkResult:
     """Return the statistics of the members of a chunk; one that fails leaves its reason and no more."""
     start = time.thread_time()
     result = empty_result(study, task, len(chunk.values))
-    reasons, engine = list(result.reason), sweep_of(study.system)
+    reasons, engine = list(result.reason), sweep_of(study.executable)
     rows = [study.system.output_index(name) for name in task.responses]
     for k, row in enumerate(chunk.values):
         try:

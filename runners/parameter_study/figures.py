@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from scipy import stats
 
 from ..figures import COLORS, STYLE, words, wrapped
+from ..larger_side import LABEL, LARGER_SIDE, larger_side
 from ..statistics import COMBINED
 from .compute import COMPUTED, FAILED, STATUS, UNSTABLE
 from .measures import PEAK, displayed
@@ -18,7 +19,7 @@ BINS = 40
 
 
 def histogram_figure(result: ParameterStudy, measured: xr.Dataset, found: xr.Dataset, response: str) -> Figure:
-    """Return the distribution of the peak mean + 3 sigma beside the first-order normal one.
+    """Return the distribution of the peak |mean| + 3 sigma beside the first-order normal one.
 
     The axes are those of the stable members; unstable ones beyond them are counted.
     """
@@ -50,7 +51,7 @@ def histogram_figure(result: ParameterStudy, measured: xr.Dataset, found: xr.Dat
             cumulative.plot(x, 100 * below, "--", color=COLORS[COMBINED], lw=2, label="first order")
         for axes in (density, cumulative):
             axes.axvline(factor * at["nominal"].item(), color="black", lw=1, ls=":", label="nominal")
-            axes.set_xlabel(f"peak of mean + 3σ {words(response)} ({unit})")
+            axes.set_xlabel(f"peak of {LABEL} {words(response)} ({unit})")
             if last > first:
                 axes.set_xlim(first - 0.03 * (last - first), last + 0.03 * (last - first))
         high = at.sel(percent=95.0)
@@ -67,17 +68,20 @@ def histogram_figure(result: ParameterStudy, measured: xr.Dataset, found: xr.Dat
         density.set_ylim(0, 1.25 * top)
         density.legend(fontsize=9, loc="upper right", frameon=True)
         cumulative.legend(fontsize=9, loc="lower right")
-        figure.suptitle(f"{wrapped(result.plan.title)}\nPeak of mean + 3σ {words(response)}")
+        figure.suptitle(f"{wrapped(result.plan.title)}\nPeak of {LABEL} {words(response)}")
     return figure
 
 
 def band_figure(result: ParameterStudy, found: xr.Dataset, response: str) -> Figure:
-    """Return mean + 3 sigma over flight time: percentiles of the members, and the first-order band at the peak."""
+    """Return |mean| + 3 sigma over flight time: percentiles of the members, and the first-order band at the peak."""
     data = result.data.sel(response=response)
     factor, unit = displayed(found, response)
     time = data["time"].values
-    upper = factor * (data["mean"] + 3 * data["std"].sel(source=COMBINED)).values[result.computed]
-    nominal = factor * (data["nominal_mean"] + 3 * data["nominal_std"].sel(source=COMBINED)).values
+    members, nominal = (
+        factor * larger_side(data[f"{of}mean"].values, data[f"{of}std"].sel(source=COMBINED).values)
+        for of in ("", "nominal_")
+    )
+    upper = members[result.computed]
     marker = "o" if time.size < 3 else None
     with rc_context(STYLE):
         figure = Figure(layout="constrained")
@@ -88,7 +92,7 @@ def band_figure(result: ParameterStudy, found: xr.Dataset, response: str) -> Fig
         median = np.median(upper, axis=0)
         axes.plot(time, median, color=COLORS["wind"], lw=1.6, label="median", marker=marker)
         axes.plot(time, nominal, ":", color="black", lw=1.6, label="nominal", marker=marker)
-        at = found.sel(measure="mean_plus_3sigma", response=response)
+        at = found.sel(measure=LARGER_SIDE, response=response)
         centre, sigma = (factor * at[name].item() for name in ("first_order_mean", "first_order_std"))
         if np.isfinite(sigma):
             half = float(stats.norm.ppf(0.95)) * sigma
@@ -101,16 +105,16 @@ def band_figure(result: ParameterStudy, found: xr.Dataset, response: str) -> Fig
         if stable.any() and not stable.all():
             shown = np.concatenate([upper[stable].ravel(), nominal])
             axes.set_ylim(shown.min() - 0.12 * np.ptp(shown), shown.max() + 0.12 * np.ptp(shown))
-        axes.set(xlabel="flight time (s)", ylabel=f"mean + 3σ {words(response)} ({unit})")
+        axes.set(xlabel="flight time (s)", ylabel=f"{LABEL} {words(response)} ({unit})")
         axes.set_title(
-            f"{wrapped(result.plan.title)}\nMean + 3σ {words(response)} of {upper.shape[0]} members", fontsize=11
+            f"{wrapped(result.plan.title)}\n{LABEL} {words(response)} of {upper.shape[0]} members", fontsize=11
         )
         axes.legend(fontsize=9)
     return figure
 
 
 def tornado_figure(result: ParameterStudy, found: xr.Dataset, response: str) -> Figure:
-    """Return the changes of the peak mean + 3 sigma, the largest on top, with the first-order ones as marks.
+    """Return the changes of the peak |mean| + 3 sigma, the largest on top, with the first-order ones as marks.
 
     Members that are unstable or failed are named; the axis is that of the others.
     """
@@ -144,14 +148,14 @@ def tornado_figure(result: ParameterStudy, found: xr.Dataset, response: str) -> 
         axes.axvline(0, color="black", lw=0.6)
         axes.grid(axis="y", visible=False)
         nominal = factor * part["nominal"].item()
-        axes.set_xlabel(f"change of the peak mean + 3σ {words(response)} from {nominal:.4g} {unit} ({unit})")
+        axes.set_xlabel(f"change of the peak {LABEL} {words(response)} from {nominal:.4g} {unit} ({unit})")
         axes.set_title(wrapped(result.plan.title), fontsize=11)
         figure.legend(fontsize=9, loc="outside lower center", ncols=3)
     return figure
 
 
 def grid_figure(result: ParameterStudy, measured: xr.Dataset, response: str) -> Figure:
-    """Return the peak mean + 3 sigma over one quantity as a line, over two as contours; of stable members."""
+    """Return the peak |mean| + 3 sigma over one quantity as a line, over two as contours; of stable members."""
     factor, unit = displayed(measured, response)
     status = result.data["status"].values
     peak = np.full(status.size, np.nan)
@@ -159,7 +163,7 @@ def grid_figure(result: ParameterStudy, measured: xr.Dataset, response: str) -> 
     peak[status != COMPUTED] = np.nan
     values = result.data["value"].values
     labels = [q.name if q.unit == "1" else f"{q.name} ({q.unit})" for q in result.quantities]
-    label = f"peak mean + 3σ {words(response)} ({unit})"
+    label = f"peak {LABEL} {words(response)} ({unit})"
     nominal = [q.nominal for q in result.quantities]
     with rc_context(STYLE):
         figure = Figure(figsize=(8.0, 5.2), layout="constrained")

@@ -10,10 +10,11 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ...model.errors import AscentwindError
+from ..larger_side import LARGER_SIDE, SIGMAS, sign
 from ..sensitivity import UndefinedElasticityWarning
 from ..study import Study
 from .distributions import covariance, marginal, score_correlation
-from .measures import MEASURES
+from .measures import MEASURES, PEAK
 from .quantities import TABLES, Quantity
 from .run import ParameterStudy
 
@@ -37,8 +38,10 @@ def gradients(result: ParameterStudy, measured: xr.Dataset) -> NDArray[np.float6
             log.warning("no first-order prediction for %s: %s", response, error)
             rows.append(np.full((len(MEASURES), len(result.quantities)), np.nan))
             continue
-        std = variance / (2 * float(measured["nominal"].sel(measure="std", response=response)))
-        by_name = {"mean": mean, "std": std, "mean_plus_3sigma": mean + 3 * std, "peak": mean + 3 * std}
+        nominal = measured["nominal"].sel(response=response)
+        std = variance / (2 * float(nominal.sel(measure="std")))
+        larger = sign(float(nominal.sel(measure="mean"))) * mean + SIGMAS * std
+        by_name = {"mean": mean, "std": std, LARGER_SIDE: larger, PEAK: larger}
         rows.append(np.array([by_name[name] for name in MEASURES]))
     return np.stack(rows, axis=1)
 

@@ -1,4 +1,4 @@
-"""What is asked of every member: peaks of mean + 3 sigma, and the statistics at the time of the nominal peak."""
+"""What is asked of every member: peaks of |mean| + 3 sigma, and the statistics at the time of the nominal peak."""
 
 from __future__ import annotations
 
@@ -6,12 +6,13 @@ import numpy as np
 import xarray as xr
 
 from ..figures import display
+from ..larger_side import LABEL, LARGER_SIDE, larger_side, side
 from ..statistics import COMBINED
 from .run import ParameterStudy
 
 PEAK = "peak"
-MEASURES = (PEAK, "mean_plus_3sigma", "mean", "std")
-LABELS = {PEAK: "peak of mean + 3σ", "mean_plus_3sigma": "mean + 3σ", "mean": "mean", "std": "σ"}
+MEASURES = (PEAK, LARGER_SIDE, "mean", "std")
+LABELS = {PEAK: f"peak of {LABEL}", LARGER_SIDE: LABEL, "mean": "mean", "std": "σ"}
 
 
 def measures(result: ParameterStudy) -> xr.Dataset:
@@ -28,7 +29,7 @@ def measures(result: ParameterStudy) -> xr.Dataset:
     mean, std = (data[name].values[kept] for name in ("mean", "std"))
     std = std[..., data["source"].values.tolist().index(COMBINED)]
     nominal_mean, nominal_std = data["nominal_mean"].values, data["nominal_std"].sel(source=COMBINED).values
-    at = np.argmax(nominal_mean + 3 * nominal_std, axis=0)
+    at = np.argmax(larger_side(nominal_mean, nominal_std), axis=0)
     responses = np.arange(at.size)
     samples = _measures(mean, std, at)
     return xr.Dataset(
@@ -38,7 +39,7 @@ def measures(result: ParameterStudy) -> xr.Dataset:
             "peak_time": ("response", data["time"].values[at], {"units": "s"}),
             "member_peak_time": (
                 ("response", "computed_member"),
-                data["time"].values[np.argmax(mean + 3 * std, axis=1)].T.reshape(responses.size, -1),
+                data["time"].values[np.argmax(larger_side(mean, std), axis=1)].T.reshape(responses.size, -1),
                 {"units": "s"},
             ),
         },
@@ -51,6 +52,11 @@ def measures(result: ParameterStudy) -> xr.Dataset:
     )
 
 
+def nominal_side(measured: xr.Dataset, response: str) -> str:
+    """Return the name of the side on which the nominal peak lies."""
+    return side(measured["nominal"].sel(measure="mean", response=response).item())
+
+
 def displayed(measured: xr.Dataset, response: str) -> tuple[float, str]:
     """Return the factor from SI and the unit in which a response is shown, from its nominal peak."""
     return display(str(measured["unit"].sel(response=response).item()), measured["nominal"].sel(response=response)[0])
@@ -58,6 +64,6 @@ def displayed(measured: xr.Dataset, response: str) -> tuple[float, str]:
 
 def _measures(mean: np.ndarray, std: np.ndarray, at: np.ndarray) -> np.ndarray:
     """Return (members, measures, responses) from (members, times, responses)."""
-    upper = mean + 3 * std
-    chosen = (x[:, at, np.arange(at.size)] for x in (upper, mean, std))
-    return np.stack([upper.max(axis=1), *chosen], axis=1)
+    larger = larger_side(mean, std)
+    chosen = (x[:, at, np.arange(at.size)] for x in (larger, mean, std))
+    return np.stack([larger.max(axis=1), *chosen], axis=1)

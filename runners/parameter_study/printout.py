@@ -8,9 +8,10 @@ from rich.console import Console
 from rich.table import Table
 
 from ..figures import words
+from ..larger_side import LABEL
 from ..terminal import print_whole
 from .compute import COMPUTED, FAILED, STATUS, UNSTABLE
-from .measures import LABELS, PEAK, displayed
+from .measures import LABELS, PEAK, displayed, nominal_side
 from .run import ParameterStudy
 
 SHOWN_REASONS = 3
@@ -36,6 +37,7 @@ def print_spread(found: xr.Dataset, console: Console) -> None:
         part = found.sel(response=response)
         (factor, unit), time = displayed(found, response), part["peak_time"].item()
         title = f"{words(response).capitalize()} ({unit}) of {found.attrs['members']} members, with 95 % intervals"
+        title += f"; nominal peak: {nominal_side(found, response)}"
         table = Table("", title=title)
         rows: list[list[str]] = [["nominal"], ["mean"], ["σ"], ["first-order σ"], ["ratio of σ"], ["95 %"], ["99 %"]]
         for measure in _names(found, "measure"):
@@ -58,7 +60,7 @@ def print_spread(found: xr.Dataset, console: Console) -> None:
         for row in rows:
             table.add_row(*row)
         print_whole(table, console)
-    table = Table("quantity", title="Shares in the spread of the peak mean + 3σ, to first order")
+    table = Table("quantity", title=f"Shares in the spread of the peak {LABEL}, to first order")
     for response in _names(found, "response"):
         table.add_column(words(response), justify="right")
     shares = found["share"].sel(measure=PEAK)
@@ -74,7 +76,8 @@ def print_changes(found: xr.Dataset, console: Console) -> None:
         part = found.sel(measure=PEAK, response=response)
         factor, unit = displayed(found, response)
         nominal = _shown(part["nominal"].item(), factor, 4)
-        title = f"Peak mean + 3σ {words(response)}, nominal {nominal} {unit}: changes ({unit})"
+        title = f"Peak {LABEL} {words(response)}, nominal {nominal} {unit} ({nominal_side(found, response)}): "
+        title += f"changes ({unit})"
         table = Table("quantity", title=title)
         for column in ("value", "change", "first order"):
             table.add_column(column, justify="right")
@@ -99,13 +102,13 @@ def print_changes(found: xr.Dataset, console: Console) -> None:
 def print_grid(result: ParameterStudy, measured: xr.Dataset, console: Console) -> None:
     """Print the least and the largest peak of every response, and the values at which they stand."""
     peak = measured["sample"].sel(measure=PEAK)
-    table = Table("response", "", title="Peak mean + 3σ over the grid")
+    table = Table("response", "", title=f"Peak {LABEL} over the grid")
     for column in ("peak", *(q.name if q.unit == "1" else f"{q.name} ({q.unit})" for q in result.quantities)):
         table.add_column(column, justify="right")
     for response in _names(measured, "response"):
         values = peak.sel(response=response).values
         factor, unit = displayed(measured, response)
-        label = f"{words(response)} ({unit})"
+        label = f"{words(response)} ({unit}), {nominal_side(measured, response)}"
         nominal = measured["nominal"].sel(measure=PEAK, response=response).item()
         at = [f"{q.nominal:.5g}" for q in result.quantities]
         table.add_row(label, "nominal", _shown(nominal, factor, 4), *at, end_section=not values.size)

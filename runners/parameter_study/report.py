@@ -73,11 +73,11 @@ def _write_csv(path: Path, rows: Iterable[Iterable[str]]) -> Path:
 
 
 def member_rows(result: ParameterStudy, measured: xr.Dataset) -> list[list[str]]:
-    """Return one row a member: quantities, status, and the peak of mean + 3 sigma of each response, SI."""
+    """Return one row a member: quantities, status, and the peak of |mean| + 3 sigma of each response, SI."""
     data, responses = result.data, _names(measured, "response")
     head = ["member", *(f"{q.name} ({q.unit})" for q in result.quantities), "status", "reason"]
     for response, unit in zip(responses, _names(measured, "unit"), strict=True):
-        head += [f"peak mean + 3 sigma of {response} ({unit})", f"at (s), {response}"]
+        head += [f"peak |mean| + 3 sigma of {response} ({unit})", f"at (s), {response}"]
     rows = [head]
     column = {int(m): i for i, m in enumerate(measured["member"].values)}
     peak, time = measured["sample"].sel(measure=PEAK).values, measured["member_peak_time"].values

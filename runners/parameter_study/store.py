@@ -45,7 +45,7 @@ def identity_of(study: Study, plan: ParameterStudyPlan, task: Task, values: NDAr
         "values of the members (SHA-256)": hashlib.sha256(np.ascontiguousarray(values).tobytes()).hexdigest(),
         **{key: made_by[key] for key in ("system", "structure", "data_sha256", "ascentwind", "casadi", "numpy")},
         "scipy": scipy.__version__,
-        "compiled sweep": sweep_of(study.system).shared_library.key,
+        "compiled sweep": sweep_of(study.executable).shared_library.key,
     }
 
 

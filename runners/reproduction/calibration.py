@@ -17,11 +17,12 @@ from ...model.shipped import find_vehicle
 from ...model.wind_statistics import WindStatistics
 from ..altitude_grid import propagated_covariance
 from ..covariance_intervals import share_inside
+from ..larger_side import LARGER_SIDE, sign
 from ..statistics import COMBINED
 from ..study import Study
 from ..wind_comparison import stretched
 from .directional import directional_derivative
-from .predictions import BENDING, ENGINE, TIME, end_times
+from .predictions import BENDING, ENGINE, TIME, end_times, larger_sides
 from .published import BY_NAME, Published
 from .rebuild import rebuilt, scaled_generalized_mass, scaled_normal_force, scaled_stiffness
 
@@ -185,7 +186,8 @@ class Model:
         s = study.response_statistics(end_times(study))
         mean = s["mean"].sel(response=BENDING, source="wind")
         times = s["time"].values
-        at_mean = float(times[np.argmax(mean.values)])
+        largest = int(np.argmax(abs(mean.values)))
+        way = float(sign(mean.values[largest]))
 
         def change(response: str, time: float, source: str, quantity: str) -> Callable[[Study], float]:
             if not derivatives:
@@ -193,11 +195,13 @@ class Model:
             found = study.sensitivity(response, time, source=source, quantity=quantity, elasticity=False)
             return lambda moved: directional_derivative(found, study, moved)
 
+        of_mean = change(BENDING, float(times[largest]), "wind", "mean")
+
         def rise(response: str) -> tuple[float, Callable[[Study], float]]:
-            total, wind = (s["mean_plus_3sigma"].sel(response=response, source=x) for x in (COMBINED, "wind"))
+            total, wind = (larger_sides(s, source).sel(response=response) for source in (COMBINED, "wind"))
             a, b = float(total.max()), float(wind.max())
-            da = change(response, float(times[np.argmax(total.values)]), COMBINED, "mean_plus_3sigma")
-            db = change(response, float(times[np.argmax(wind.values)]), "wind", "mean_plus_3sigma")
+            da = change(response, float(times[np.argmax(total.values)]), COMBINED, LARGER_SIDE)
+            db = change(response, float(times[np.argmax(wind.values)]), "wind", LARGER_SIDE)
             return a / b - 1, lambda moved: da(moved) / b - a * db(moved) / b**2
 
         def frequency(mode: int) -> tuple[float, Callable[[Study], float]]:
@@ -207,7 +211,7 @@ class Model:
 
         sigma = float(s["std"].sel(response=BENDING, source="wind", time=TIME))
         return [
-            (float(mean.max()), change(BENDING, at_mean, "wind", "mean")),
+            (way * float(mean.values[largest]), lambda moved: way * of_mean(moved)),
             (sigma, change(BENDING, TIME, "wind", "std")),
             rise(BENDING),
             rise(ENGINE),

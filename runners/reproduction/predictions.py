@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import xarray as xr
 
 from ...model.errors import DataError
 from ...model.range_reference import shipped_statistics
+from ..larger_side import larger_side
 from ..stability import roots
 from ..statistics import COMBINED, ResponseStatistics
 from ..study import Study
@@ -39,13 +41,14 @@ class Responses:
     Attributes
     ----------
     peak_mean, sigma_75, peak : float
-        Largest mean bending moment; its standard deviation at 75 s from wind alone; largest mean + 3 sigma (N m).
+        Largest size of the mean bending moment; its standard deviation at 75 s from wind alone; largest |mean| +
+        3 sigma (N m).
     peak_time : float
-        Of mean + 3 sigma (s).
+        Of |mean| + 3 sigma (s).
     engine : float
-        Largest mean + 3 sigma of the engine angle (rad).
+        Largest |mean| + 3 sigma of the engine angle (rad).
     rise_bending, rise_attack, rise_engine : float
-        What thrust and centre-of-pressure noise add to mean + 3 sigma, relative.
+        What thrust and centre-of-pressure noise add to |mean| + 3 sigma, relative.
     """
 
     peak_mean: float
@@ -72,10 +75,14 @@ def end_times(study: Study) -> list[float]:
     return sorted({*(t for t in times if study.system.start < t <= study.system.end), TIME})
 
 
+def larger_sides(statistics: ResponseStatistics, source: str) -> xr.DataArray:
+    """Return |mean| + 3 sigma from one source, or all, (time, response)."""
+    return larger_side(*(statistics[name].sel(source=source) for name in ("mean", "std")))
+
+
 def responses(statistics: ResponseStatistics) -> Responses:
     """Return the numbers of a full table of responses."""
-    both = statistics["mean_plus_3sigma"].sel(source=COMBINED)
-    wind = statistics["mean_plus_3sigma"].sel(source="wind")
+    both, wind = (larger_sides(statistics, source) for source in (COMBINED, "wind"))
     at = {"response": ATTACK, "time": TIME}
 
     def rise(response: str) -> float:
@@ -83,7 +90,7 @@ def responses(statistics: ResponseStatistics) -> Responses:
 
     moment = both.sel(response=BENDING)
     return Responses(
-        peak_mean=float(statistics["mean"].sel(response=BENDING, source="wind").max()),
+        peak_mean=float(abs(statistics["mean"].sel(response=BENDING, source="wind")).max()),
         sigma_75=float(statistics["std"].sel(response=BENDING, source="wind", time=TIME)),
         peak=float(moment.max()),
         peak_time=float(moment["time"].values[int(np.argmax(moment.values))]),
