@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from .errors import DataError, PlausibilityWarning
 
 if TYPE_CHECKING:
+    from .tables import Table
     from .vehicle import Vehicle
 
 Array = NDArray[np.float64]
@@ -32,6 +33,11 @@ SHORTEST = 0.01  # s, between rows whose difference is taken as a rate
 SLOSH_ROOT = 1.841  # omega^2 R / a of the first lateral mode in a deep circular tank
 SAME_STATION = 1e-3  # m
 MOST_TOLD = 3
+_GROUPS = {  # tables without a prefix, by the file they stand in; the others are the trajectory's
+    **dict.fromkeys(("mass", "moment_of_inertia", "center_of_gravity"), "rigid_body"),
+    **dict.fromkeys(("thrust", "control_thrust"), "propulsion"),
+    **dict.fromkeys(("normal_force_slope", "center_of_pressure"), "aerodynamics"),
+}
 
 
 @dataclass(frozen=True)
@@ -90,6 +96,7 @@ def contradictions(vehicle: Vehicle) -> list[Contradiction]:
         *compared.aerodynamics(),
         *compared.moments(),
         *compared.stations(),
+        *compared.rows(),
     ]
 
 
@@ -283,7 +290,41 @@ class _Compared:
                 "of no launch vehicle; look at its unit (rad/s), and at moment_of_inertia and mass",
                 frequency=frequency, length=length,
             )  # fmt: skip
+        for table in tables:
+            yield from self._shape(table, length)
         yield from self._twice("bending", tables, "frequency", "generalized_mass")
+
+    def _shape(self, table: str, length: Array) -> Iterator[Contradiction]:
+        """A mode's generalised mass, displacements and slopes against each other, the mass and the normal force."""
+        names = [name.removeprefix(f"{table}.") for name in self.vehicle.tables if name.startswith(f"{table}.")]
+        moved = self._largest(table, [n for n in names if n.startswith("displacement_at_")])
+        turned = self._largest(table, [n for n in names if n.startswith("slope_at_")])
+        share = self.at(f"{table}.generalized_mass") / (self.mass * np.maximum(moved, 1.0) ** 2)
+        yield from self.beyond(
+            table, "generalized_mass", share, (1e-3, 2.0), (0.0, np.inf),
+            "is {x:.3g} times the vehicle's mass of {mass:.4g} kg at displacements up to {moved:.3g}; look at its unit "
+            "and at the scale of the mode's displacements",
+            mass=self.mass, moved=moved,
+        )  # fmt: skip
+        yield from self.beyond(
+            table, "slope_at_gimbal", turned * length / np.maximum(moved, 1e-300), (0.1, 100.0), (0.0, np.inf),
+            "and the other slopes reach {turned:.3g} per m, the displacements {moved:.3g}, on a vehicle about "
+            "{length:.3g} m long; look at the units of slopes (1/m) and displacements",
+            turned=turned, moved=moved, length=length,
+        )  # fmt: skip
+        slope = np.abs(self.at("normal_force_slope"))
+        for column, size in (("displacement", np.maximum(moved, 1.0)), ("slope", turned)):
+            name = f"normal_force_slope_times_{column}"
+            values = self.at(f"{table}.{name}")
+            yield from self.beyond(
+                table, name, np.abs(values) / np.maximum(slope * size, 1e-300), (0.0, 5.0), (0.0, np.inf),
+                f"is {{values:.4g}}, but normal_force_slope is {{slope:.4g}} and the mode's {column} at "
+                "most {{size:.3g}}; look at its scale",
+                self.felt, values=values, slope=slope, size=size,
+            )  # fmt: skip
+
+    def _largest(self, table: str, columns: list[str]) -> Array:
+        return np.max([np.abs(self.at(f"{table}.{c}")) for c in columns], axis=0)
 
     def aerodynamics(self) -> Iterator[Contradiction]:
         slope = self.at("normal_force_slope")
@@ -314,6 +355,47 @@ class _Compared:
                 yield from self.beyond(
                     table, column, size, (1e-3, np.inf), (0.0, np.inf), text, largest, values=values, scale=scale
                 )
+
+        for load in self.vehicle.file.loads:
+            yield from self._inertia(f"loads.{load.output}")
+
+    def _inertia(self, table: str) -> Iterator[Contradiction]:
+        """Moments that slosh and bending leave at a station, against their masses times the radius of gyration."""
+        scales = {f"slosh_{t.name}": self.at(f"slosh.{t.name}.mass") * self.gyration for t in self.vehicle.slosh}
+        for i in range(1, len(self.vehicle.bending) + 1):
+            scales[f"bending_{i}"] = self.mass * self.gyration
+        for column, scale in scales.items():
+            values = self.at(f"{table}.{column}")
+            yield from self.beyond(
+                table, column, np.abs(values) / scale, (0.0, 20.0), (0.0, np.inf),
+                "is {values:.4g} N s2, where its mass at the radius of gyration makes {scale:.4g} kg m; look at its "
+                "unit and rows",
+                values=values, scale=scale,
+            )  # fmt: skip
+
+    def rows(self) -> Iterator[Contradiction]:
+        """No row of a smooth table stands apart from those around it."""
+        for name, table in self.vehicle.tables.items():
+            found = _apart(table)
+            if found is not None:
+                k, expected = found
+                source = self._source(name)
+                yield Contradiction(
+                    f"is {table.values[k]:.6g} between rows that make {expected:.6g}; correct the row, or name its "
+                    "time under [events] if the table jumps there",
+                    self.files[source],
+                    name.removeprefix(f"{source}.").removeprefix("control."),
+                    float(table.argument[k]),
+                    False,
+                )
+
+    def _source(self, name: str) -> str:
+        """Return under which name the file of a table is listed."""
+        sensor = name.removeprefix("control.").split(".")[0]
+        if name.startswith("control."):
+            return f"load_relief.{sensor}" if f"load_relief.{sensor}" in self.files else "control.gains"
+        prefixes = [s for s in self.files if name.startswith(f"{s}.")]
+        return max(prefixes, key=len) if prefixes else _GROUPS.get(name, "trajectory")
 
     def stations(self) -> Iterator[Contradiction]:
         """Everything on the vehicle lies within some radii of gyration of its centre of gravity."""
@@ -370,6 +452,34 @@ class _Compared:
                 if all(np.array_equal(self.at(f"{table}.{c}"), self.at(f"{other}.{c}")) for c in columns):
                     why = f"holds the numbers of {self.files[other].name}; remove one [[{kind}]], or it counts twice"
                     yield Contradiction(why, self.files[table], columns[0], None, True)
+
+
+def _apart(table: Table) -> tuple[int, float] | None:
+    """Return the row of a table that is far off the cubic through two rows on either side, and the cubic's value there.
+
+    It must be off by a fifth of the other rows' range, and by twenty times what nine of ten other rows are.
+    """
+    x, y = table.argument, table.values
+    if table.interpolation not in ("cubic", "pchip") or x.size < 12:
+        return None
+    k = np.arange(2, x.size - 2)
+    around = np.stack([k - 2, k - 1, k + 1, k + 2])
+    weights = np.ones(around.shape)
+    for i in range(4):
+        for j in range(4):
+            if i != j:
+                weights[i] *= (x[k] - x[around[j]]) / (x[around[i]] - x[around[j]])
+    expected = np.sum(weights * y[around], axis=0)
+    off = np.abs(y[k] - expected) / np.maximum(1.0, np.abs(weights).sum(axis=0))
+    for event in table.breaks:  # across a jump no row fits
+        off[(x[k - 2] <= event) & (event <= x[k + 2])] = 0.0
+    worst = int(np.argmax(off))
+    others = np.delete(y, k[worst])
+    usual = float(np.quantile(np.delete(off, range(max(worst - 2, 0), min(worst + 3, off.size))), 0.9))
+    size = max(float(np.ptp(others)), 1e-2 * float(np.abs(others).max()))
+    if off[worst] > max(0.2 / 3 * size, 20 * usual):
+        return int(k[worst]), float(expected[worst])
+    return None
 
 
 def _excess(values: Array, limit: float, sign: int) -> Array:

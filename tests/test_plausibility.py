@@ -153,6 +153,49 @@ def test_both_numbers_are_told(tmp_path):
         load_vehicle(folder)
 
 
+ROWS = [
+    ("bending_1.csv", "slope_at_sensor"),
+    ("bending_2.csv", "displacement_at_s1_lox"),
+    ("loads_station_10m.csv", "bending_1"),
+    ("loads_station_16m.csv", "slosh_s2_lox"),
+    ("aerodynamics.csv", "normal_force_slope"),
+    ("slosh_s1_rp1.csv", "attach_point"),
+    ("bending_2.csv", "normal_force_slope_times_displacement"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("file", "column"), ROWS)
+def test_a_row_that_stands_apart(tmp_path, file, column):
+    """One wrong row."""
+    folder = change_table(copied("falcon1", tmp_path), file, scaled(column, 10.0, only=90.0))
+    with pytest.warns(PlausibilityWarning, match=rf"{file}, column '{column}', t = 90 s: is .* between rows that make"):
+        load_vehicle(folder)
+
+
+SHAPES = [
+    ("bending_1.csv", "generalized_mass", 1e3, "times the vehicle's mass"),
+    ("bending_1.csv", "generalized_mass", 1e-3, "times the vehicle's mass"),
+    ("bending_2.csv", "slope_at_sensor", 1e3, r"look at the units of slopes \(1/m\)"),
+    ("bending_1.csv", "displacement_at_gimbal", 1e3, "at displacements up to"),
+    ("bending_1.csv", "normal_force_slope_times_displacement", 57.3, "look at its scale"),
+    ("loads_station_10m.csv", "bending_1", 1e3, "where its mass at the radius of gyration"),
+    ("loads_station_10m.csv", "slosh_s1_lox", 1e3, "where its mass at the radius of gyration"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("file", "column", "factor", "message"), SHAPES)
+def test_modes_and_loads_of_another_scale(tmp_path, file, column, factor, message):
+    folder = change_table(copied("falcon1", tmp_path), file, scaled(column, factor))
+    with pytest.warns(PlausibilityWarning, match=message):
+        load_vehicle(folder)
+
+
+def test_a_jump_at_an_event_is_no_row_apart():
+    """AS-504's tables jump where its centre engine is cut off, and its rows stand 0.1 ms either side."""
+    vehicle = load_vehicle(SHIPPED["as504"])
+    assert vehicle.tables["thrust"].breaks == (134.34,)
+
+
 STATIONS = [
     ("station_m = 10.0 ", "station_m = 9999 ", "puts the gimbal plane at station|radii of gyration"),
     ("forward_of_gimbal_m = 7.46", "forward_of_gimbal_m = 9996.46", "radii of gyration|puts the gimbal plane"),
