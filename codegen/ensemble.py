@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from ..model.errors import AscentwindError
 from ..model.system import LinearSystem
-from .cache import CompiledLibrary, compiled_library
+from .cache import CompiledLibrary, compiled_library, wrong_numbers
 from .compiler import find_compiler
+from .ensemble_check import AGREEMENT, difference_from_numpy
 from .expressions import template_environment
 from .interruption import call
 
@@ -101,7 +102,7 @@ def ensemble_source(system: LinearSystem) -> str:
 
 
 def compiled_ensemble(system: LinearSystem) -> CompiledEnsemble:
-    """Compile the ensemble of a system, or take it from the cache.
+    """Compile the ensemble of a system, or take it from the cache; hold its numbers against NumPy's.
 
     Raises
     ------
@@ -118,4 +119,9 @@ def compiled_ensemble(system: LinearSystem) -> CompiledEnsemble:
         "states": str(len(system.states)), "sources": str(len(system.sources)), "outputs": str(len(system.outputs)),
     }  # fmt: skip
     fingerprint = hashlib.sha256(source.encode()).hexdigest()
-    return CompiledEnsemble(compiled_library(f"{system.name}-ensemble", fingerprint, lambda: source, compiler, sizes))
+    library = compiled_library(f"{system.name}-ensemble", fingerprint, lambda: source, compiler, sizes)
+    engine = CompiledEnsemble(library)
+    difference = difference_from_numpy(engine, *map(int, sizes.values()))
+    if not difference <= AGREEMENT:
+        raise wrong_numbers(library, difference)
+    return engine

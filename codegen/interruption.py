@@ -53,10 +53,12 @@ def call(function: Callable[..., int], *arguments: object) -> int:
         If the code was stopped.
     """
     flag = getattr(_of_thread, "flag", None)
-    if flag is None and threading.current_thread() is threading.main_thread():
-        with Workers(1) as pool:
-            return pool.submit(call, function, *arguments).result()
-    code = function(*arguments, ctypes.byref(flag or ctypes.c_int(0)))
+    if flag is None:
+        if threading.current_thread() is threading.main_thread():
+            with Workers(1) as pool:
+                return pool.submit(call, function, *arguments).result()
+        flag = ctypes.c_int(0)  # of a thread that is not ours: nobody raises it
+    code = function(*arguments, ctypes.byref(flag))
     if code == STOPPED:
         raise KeyboardInterrupt
     return code

@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 
 from ..model.errors import AscentwindError, DataError, IntegrationError, StepBudgetError
 from ..model.system import LinearSystem
-from .cache import CompiledLibrary, compiled_library
+from .cache import CompiledLibrary, compiled_library, wrong_numbers
 from .compiled import ExecutableSystem
 from .compiler import Compiler, find_compiler, known_flags
 from .functions import state_scales
 from .interruption import call
+from .sweep_check import AGREEMENT, NominalNumbers, difference_from_interpreter
 from .sweep_source import MOST_STEPS, SweepFunctions, sweep_fingerprint, sweep_functions, sweep_source
 
 NOT_FINITE, TOO_SMALL_A_STEP, OUT_OF_RANGE, TOO_MANY_STEPS = 1, 2, 3, 4  # as in the template
@@ -97,10 +98,22 @@ class CompiledSweep:
         ------
         IntegrationError, DataError
         """
+        system, n = self.system, len(self.system.states)
+        covariances = [system.start_covariance_matrix(name, executable.parameters) for name in system.sources]
+        state = np.ascontiguousarray(np.array(covariances).reshape(len(system.sources), n, n))
+        return self.integrate(executable, segments, tolerance, state, transition)
+
+    def integrate(
+        self,
+        executable: ExecutableSystem | NominalNumbers,
+        segments: Segments,
+        tolerance: float,
+        state: NDArray[np.float64],
+        transition: bool = False,
+    ) -> SegmentResults:
+        """Sweep from covariances (sources, n, n) of the states, which become those at the end; else as ``run``."""
         system = self.system
         k, n, s, r = segments.end.size, len(system.states), len(system.sources), len(system.outputs)
-        covariances = [system.start_covariance_matrix(name, executable.parameters) for name in system.sources]
-        state = np.ascontiguousarray(np.array(covariances).reshape(s, n, n))
         covariance, mean, error = np.empty((k, s, r, r)), np.empty((k, r)), np.empty((k, s, r))
         kept = np.empty((k, n, n)) if transition else None
         counters, failure = np.zeros(3), np.zeros(2)
@@ -113,7 +126,7 @@ class CompiledSweep:
         return SegmentResults(covariance, mean, error, kept, _named(counters))
 
     def mean_history(
-        self, executable: ExecutableSystem, segments: Segments, tolerance: float
+        self, executable: ExecutableSystem | NominalNumbers, segments: Segments, tolerance: float
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], dict[str, int]]:
         """Return states (k + 1, n) and outputs (k + 1, responses) of the mean at the start and all segment ends.
 
@@ -134,7 +147,9 @@ class CompiledSweep:
         self._check(code, failure, executable, tolerance)
         return states, outputs, _named(counters)
 
-    def _arguments(self, executable: ExecutableSystem, segments: Segments, tolerance: float) -> list[object]:
+    def _arguments(
+        self, executable: ExecutableSystem | NominalNumbers, segments: Segments, tolerance: float
+    ) -> list[object]:
         arrays = (segments.end, segments.low, segments.high, executable.parameters, executable.tables)
         return [
             ctypes.c_int(segments.end.size),
@@ -144,7 +159,13 @@ class CompiledSweep:
             _pointer(np.concatenate([state_scales(self.system), [o.scale for o in self.system.outputs]])),
         ]
 
-    def _check(self, code: int, failure: NDArray[np.float64], executable: ExecutableSystem, tolerance: float) -> None:
+    def _check(
+        self,
+        code: int,
+        failure: NDArray[np.float64],
+        executable: ExecutableSystem | NominalNumbers,
+        tolerance: float,
+    ) -> None:
         time, entry = float(failure[0]), int(failure[1])
         if code == NOT_FINITE:
             for group in executable.groups:
@@ -190,7 +211,7 @@ class CompiledSweep:
 
 
 def compiled_sweep(system: LinearSystem) -> CompiledSweep:
-    """Generate and compile the sweep of a system, or take it from the cache.
+    """Generate and compile the sweep of a system, or take it from the cache; hold its numbers against CasADi's.
 
     Raises
     ------
@@ -210,7 +231,11 @@ def compiled_sweep(system: LinearSystem) -> CompiledSweep:
         optimizing(compiler),
         dict(system.structure),
     )
-    return CompiledSweep(system, functions, library)
+    compiled = CompiledSweep(system, functions, library)
+    difference = difference_from_interpreter(compiled)
+    if not difference <= AGREEMENT:
+        raise wrong_numbers(library, difference)
+    return compiled
 
 
 def optimizing(compiler: Compiler) -> Compiler:

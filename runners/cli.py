@@ -255,6 +255,20 @@ def doctor() -> None:
     console.print(table)
 
 
+@app.command()
+def cache(
+    clean: Annotated[bool, typer.Option("--clean", help="Remove the libraries; they are compiled anew.")] = False,
+) -> None:
+    """Where compiled code is kept and how much room it takes; what killed runs left there is removed."""
+    from ..codegen.cache import cache_contents, cache_folder, clean_cache, remove_leftovers
+
+    folder = cache_folder()
+    removed = clean_cache(folder) if clean else remove_leftovers(folder)
+    held = cache_contents(folder)
+    console.print(f"{folder}: {held.libraries} compiled libraries, {held.size / 1e6:.1f} MB", soft_wrap=True)
+    console.print(f"{removed} files and folders removed", style="dim")
+
+
 def main() -> None:
     """Run the command line; errors that ascentwind raises on purpose end with their sentence and exit code 2."""
     use_plain_characters()

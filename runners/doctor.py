@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import platform
 from dataclasses import dataclass
 
 import casadi as ca
 
-from ..codegen.cache import CacheError, cache_folder
+from ..codegen.cache import CacheError, cache_contents, cache_folder
 from ..codegen.compiler import CompilerError, find_compiler
 
 
@@ -42,14 +43,21 @@ def diagnose() -> list[Finding]:
     findings.append(
         Finding("CVODES", "in CasADi" if has_cvodes else "missing", has_cvodes, "reinstall casadi from its wheel")
     )
+    cached = False
     try:
         folder = cache_folder()
-        count = len(list(folder.glob("*.so")))
-        findings.append(Finding("cache", f"{folder} ({count} compiled libraries)", True))
-        cached = True
+        held = cache_contents(folder)
+        text = f"{folder} ({held.libraries} compiled libraries, {held.size / 1e6:.1f} MB)"
+        cached = os.access(folder, os.W_OK)
+        advice = "it cannot be written: what it does not hold is interpreted; set ASCENTWIND_CACHE to one that can"
+        findings.append(Finding("cache", text, cached, advice))
     except CacheError as error:
         findings.append(Finding("cache", "not usable", False, str(error)))
-        cached = False
-    engine = "compiled C" if compiler and cached else "CasADi's interpreter"
-    findings.append(Finding("engine", f"CVODES with {engine}", True))
+    if compiler and cached:
+        found = "sweep, compiled C"
+    elif compiler:
+        found = "sweep where the cache holds it, else CVODES with CasADi's interpreter"
+    else:
+        found = "CVODES with CasADi's interpreter"
+    findings.append(Finding("default engine", found, True))
     return findings

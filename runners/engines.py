@@ -14,7 +14,7 @@ from .covariance import CovarianceOptions, covariance_equation
 from .ensemble import EnsembleOptions, ensemble_dataset
 from .integration import IntegratorOptions
 from .statistics import COMBINED, ResponseStatistics, provenance, response_dataset, statistics_dataset
-from .sweep_engine import LEAST_TOLERANCE, SweepOptions, SweepResult, sweep, sweep_of
+from .sweep_engine import LEAST_TOLERANCE, SweepOptions, SweepResult, available_sweep, sweep, sweep_of
 from .time_nodes import time_nodes
 
 if TYPE_CHECKING:
@@ -83,10 +83,10 @@ def engine_options(name: str | None, *, compiled: bool = True, **settings: objec
 
 
 def default_engine(study: Study, options: object | None) -> str:
-    """Return the engine that options belong to; without any the sweep, or CVODES where nothing is compiled."""
+    """Return the engine that options belong to; without any the sweep, or CVODES where that cannot be compiled."""
     if options is not None:
         return next((name for name, e in ENGINES.items() if isinstance(options, e.options)), "sweep")
-    return "cvodes" if study.executable.shared_library is None else "sweep"
+    return "cvodes" if available_sweep(study.executable) is None else "sweep"
 
 
 def compute_statistics(

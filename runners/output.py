@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import os
+import re
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -14,6 +15,7 @@ import numpy as np
 from ..model.errors import OutputFolderError
 from .statistics import ResponseStatistics
 
+HALF_FILE = re.compile(r"\..+\.(?P<process>\d+)\.unfinished(\.\w+)?")
 COLUMNS = ("time_s", "response", "unit", "source", "mean", "variance", "std", "mean_plus_3sigma")
 
 
@@ -28,10 +30,30 @@ def prepare_folder(folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
             pass
+        _remove_leftovers(folder)
     except OSError as error:
         raise OutputFolderError(
             f"results cannot be written to {folder} ({error.strerror or error}); choose another folder with --out"
         ) from None
+
+
+def _remove_leftovers(folder: Path) -> None:
+    """Remove half files of processes that are no more."""
+    for path in folder.glob(".*"):
+        if (left := HALF_FILE.fullmatch(path.name)) and not _runs(int(left["process"])):
+            path.unlink(missing_ok=True)
+
+
+def _runs(process: int) -> bool:
+    if os.name != "posix":
+        return True  # there is no asking without harm
+    try:
+        os.kill(process, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except PermissionError:
+        pass
+    return True
 
 
 def write_whole(path: Path, write: Callable[[Path], object]) -> Path:
@@ -42,7 +64,7 @@ def write_whole(path: Path, write: Callable[[Path], object]) -> Path:
     OutputFolderError
         The file that stood at ``path`` before, if any, is untouched.
     """
-    temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
+    temporary = path.with_name(f".{path.stem}.{os.getpid()}.unfinished{path.suffix}")
     try:
         write(temporary)
         temporary.replace(path)

@@ -23,7 +23,7 @@ from ..model.wind_statistics import WindModel
 from .mean_response import with_mean_tables
 from .planar_mean import with_nonlinear_mean
 from .stability import Root, check_coupling, matrices_at, roots
-from .sweep_engine import sweep_of, with_sweep_mean_tables
+from .sweep_engine import available_sweep, with_sweep_mean_tables
 from .time_nodes import on_flight
 from .wind_range import warn_beyond
 from .wind_start import covariance_at
@@ -145,9 +145,8 @@ class StudyNumbers:
     @cached_property
     def linear_means(self) -> ExecutableSystem:
         """The system with its tables of the mean response filled in by the linear mean."""
-        if self.executable.shared_library is None:
-            return with_mean_tables(self.executable)
-        return with_sweep_mean_tables(sweep_of(self.executable), self.executable)
+        engine = available_sweep(self.executable)
+        return with_mean_tables(self.executable) if engine is None else with_sweep_mean_tables(engine, self.executable)
 
     @cached_property
     def with_means(self) -> ExecutableSystem:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -10,7 +11,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..codegen.compiled import ExecutableSystem
+from ..codegen.cache import CacheError
+from ..codegen.compiled import ExecutableSystem, InterpreterWarning
 from ..codegen.interruption import Workers
 from ..codegen.sweep import CompiledSweep, NoCompilerError, Segments, compiled_sweep
 from ..model.errors import AscentwindError, IntegrationError, TimeRangeError
@@ -65,6 +67,23 @@ def sweep_of(executable: ExecutableSystem) -> CompiledSweep:
 
 
 _sweep_of = lru_cache(maxsize=16)(compiled_sweep)
+
+
+def available_sweep(executable: ExecutableSystem) -> CompiledSweep | None:
+    """Return the compiled sweep of a system; None where it is interpreted, or the cache cannot take the sweep.
+
+    Warns
+    -----
+    InterpreterWarning
+        Of the second.
+    """
+    if executable.shared_library is None:
+        return None
+    try:
+        return sweep_of(executable)
+    except CacheError as error:
+        warnings.warn(InterpreterWarning(f"CVODES takes the place of the sweep: {error}"), stacklevel=3)
+        return None
 
 
 @dataclass(frozen=True, eq=False)
