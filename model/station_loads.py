@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .csv_table import read_csv_table
-from .errors import DataError
+from .errors import DataError, PlausibilityWarning
 from .folder_files import file_inside
 from .loads import REACTION_COLUMNS, load_columns
 from .local_aerodynamics import local_load_columns
@@ -18,6 +19,8 @@ from .tables import Table
 from .vehicle import Vehicle
 
 KEY = "loads_along_vehicle"
+SAME_STATION = 1e-6  # m
+DIFFERENT = 1e-3  # of the largest coefficient
 ARGUMENTS = (("time", "s", ""), ("station", "m", ""), ("forward_of_gimbal", "m", ""))
 
 
@@ -99,4 +102,27 @@ def load_station_loads(vehicle: Vehicle) -> StationLoads:
         return tuple(Table(name, unit, times, row, entry.interpolation, breaks) for row in values.T)
 
     forward = csv.columns["forward_of_gimbal"][order].reshape(shape)[0]
-    return StationLoads(stations, forward, {name: tables(name, unit) for name, unit, _ in columns})
+    found = StationLoads(stations, forward, {name: tables(name, unit) for name, unit, _ in columns})
+    _compare(vehicle, found, file)
+    return found
+
+
+def _compare(vehicle: Vehicle, along: StationLoads, file: Path) -> None:
+    """Warn where a load's own table and the stations along the vehicle tell of different vehicles."""
+    for load in vehicle.file.loads:
+        k = int(np.argmin(np.abs(along.station - load.station_m)))
+        if abs(along.station[k] - load.station_m) > SAME_STATION:
+            continue
+        for column in ("angle_of_attack", "engine_angle"):
+            own, other = vehicle.tables[f"loads.{load.output}.{column}"], along.tables[column][k]
+            times = other.argument[(other.argument >= own.argument[0]) & (other.argument <= own.argument[-1])]
+            here, there = own.polynomial(times), other.polynomial(times)
+            off = np.abs(here - there)
+            worst = int(np.argmax(off))
+            if off[worst] > DIFFERENT * np.abs(here).max():
+                warnings.warn(
+                    f"{file}, column '{column}', t = {times[worst]:g} s: is {there[worst]:.6g} at station "
+                    f"{load.station_m:g} m, but {load.table.file} has {here[worst]:.6g}; build both again",
+                    PlausibilityWarning,
+                    stacklevel=3,
+                )

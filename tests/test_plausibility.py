@@ -14,6 +14,7 @@ from ascentwind.model import load_vehicle
 from ascentwind.model.errors import DataError, PlausibilityWarning
 from ascentwind.model.plausibility import station_in_name
 from ascentwind.model.shipped import built_in_vehicles
+from ascentwind.model.station_loads import load_station_loads
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -188,6 +189,16 @@ def test_modes_and_loads_of_another_scale(tmp_path, file, column, factor, messag
     folder = change_table(copied("falcon1", tmp_path), file, scaled(column, factor))
     with pytest.warns(PlausibilityWarning, match=message):
         load_vehicle(folder)
+
+
+def test_loads_along_the_vehicle_and_their_own_tables(tmp_path):
+    """The same station twice: as shipped they agree, and one built before the other does not."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        load_station_loads(load_vehicle(SHIPPED["falcon1"]))
+    folder = change_table(copied("falcon1", tmp_path), "loads_station_10m.csv", scaled("angle_of_attack", 1.1))
+    with pytest.warns(PlausibilityWarning, match=r"at station 10 m, but loads_station_10m.csv has .*build both again"):
+        load_station_loads(load_vehicle(folder))
 
 
 def test_a_jump_at_an_event_is_no_row_apart():
