@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..model.errors import IntegrationError, UnknownNameError
+from ..model.errors import AscentwindWarning, IntegrationError, UnknownNameError
 from .adjoint import AdjointSolver
 from .covariance import CovarianceOptions, covariance_equation
 from .ensemble import EnsembleOptions, ensemble_dataset
@@ -22,6 +23,10 @@ if TYPE_CHECKING:
 
 LOOKS = 1024  # pieces of flight in which a check begins anew
 Progress = Callable[[float], None]
+
+
+class UncheckedStatisticsWarning(AscentwindWarning):
+    """A finer discretisation, asked for as a check, could not be computed; the difference to it is infinite."""
 
 
 @dataclass(frozen=True)
@@ -103,6 +108,10 @@ def compute_statistics(
     Raises
     ------
     UnknownNameError, IntegrationError
+
+    Warns
+    -----
+    UncheckedStatisticsWarning
     """
     if engine is None:
         engine = default_engine(study, options)
@@ -114,10 +123,18 @@ def compute_statistics(
         )
     found = chosen.compute(study, times, responses, settings, progress)
     if check:
-        finer = chosen.compute(study, times, responses, chosen.finer(settings, times[-1] - study.system.start), None)
+        difference = np.full(found.std.shape, np.inf)
+        try:
+            finer = chosen.compute(
+                study, times, responses, chosen.finer(settings, times[-1] - study.system.start), None
+            )
+            difference = relative_difference(found.std.values, finer.std.values)
+        except IntegrationError as error:
+            text = f"the statistics could not be checked by a finer discretisation, and none is known to hold: {error}"
+            warnings.warn(UncheckedStatisticsWarning(text), stacklevel=4)
         found["discretisation_difference"] = (
             found.std.dims,
-            relative_difference(found.std.values, finer.std.values),
+            difference,
             {"units": "1", "long_name": "std against a finer discretisation, relative"},
         )
     return found
@@ -229,9 +246,18 @@ def _ensemble(
     return found
 
 
-def _finer(options: Any, flight: float) -> Any:
-    """Return a tenth of the tolerance, and looks at flight so often that no step passes over what the first missed."""
-    tolerance = max(LEAST_TOLERANCE, 0.1 * options.relative_tolerance)
+def _finer_sweep(options: SweepOptions, flight: float) -> SweepOptions:
+    """Return a tenth of the tolerance, in pieces so short that no step passes over what the first pass missed."""
+    return _in_pieces(options, flight, 0.1)
+
+
+def _begun_anew(options: Any, flight: float) -> Any:
+    """Return options for the same pieces; beginning anew in each has an error of its own, kept below the first's."""
+    return _in_pieces(options, flight, 1e-3)
+
+
+def _in_pieces(options: Any, flight: float, share: float) -> Any:
+    tolerance = max(LEAST_TOLERANCE, share * options.relative_tolerance)
     longest = min(options.longest_interval, flight / LOOKS) if flight > 0 else options.longest_interval
     return replace(options, relative_tolerance=tolerance, longest_interval=longest)
 
@@ -241,15 +267,15 @@ def _finer_ensemble(options: EnsembleOptions, flight: float) -> EnsembleOptions:
 
 
 ENGINES = {
-    "sweep": Engine("sweep", SweepOptions, _sweep, _finer, SweepOptions(relative_tolerance=1e-9)),
+    "sweep": Engine("sweep", SweepOptions, _sweep, _finer_sweep, SweepOptions(relative_tolerance=1e-9)),
     "cvodes": Engine(
-        "adjoint (CVODES)", IntegratorOptions, _cvodes, _finer, IntegratorOptions(relative_tolerance=1e-9)
+        "adjoint (CVODES)", IntegratorOptions, _cvodes, _begun_anew, IntegratorOptions(relative_tolerance=1e-9)
     ),
     "covariance": Engine(
         "covariance equation (SciPy)",
         CovarianceOptions,
         _covariance,
-        _finer,
+        _begun_anew,
         CovarianceOptions(relative_tolerance=1e-9),
     ),
     "ensemble": Engine("ensemble", EnsembleOptions, _ensemble, _finer_ensemble, None),

@@ -65,9 +65,9 @@ class Study(StudyNumbers):
         options : SweepOptions, IntegratorOptions, CovarianceOptions or EnsembleOptions, optional
             As the engine takes; alone they choose it.
         check : bool
-            Compute everything a second time with a finer discretisation (a tenth of the tolerance, half the substep of
-            the ensemble), beginning anew in each of 1024 pieces of the flight so that no step passes over a pulse, and
-            keep the relative difference of the standard deviation as ``discretisation_difference``.
+            Compute everything a second time with a finer discretisation (a tenth of the tolerance or less, half the
+            substep of the ensemble), in each of 1024 pieces of the flight so that no step passes over a pulse, and keep
+            the relative difference of the standard deviation as ``discretisation_difference``.
         progress : callable, optional
             Called with each end time when it is done.
 

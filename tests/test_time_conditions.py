@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import pairwise
 
 import casadi as ca
 import numpy as np
 import pytest
 from ascentwind.model import LinearSystem, define_system
-from ascentwind.model.errors import NonlinearSystemError, SwitchError
+from ascentwind.model.errors import IntegrationError, NonlinearSystemError, SwitchError
 from ascentwind.model.interval_arithmetic import bounds
 from ascentwind.runners import CovarianceOptions, IntegratorOptions, Study, SweepOptions
 from ascentwind.runners.discretisation import discretise
+from ascentwind.runners.engines import ENGINES, UncheckedStatisticsWarning
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
@@ -216,3 +218,18 @@ def test_bounds_hold_what_they_bound(seed):
         defined = np.isfinite(value)
         slack = np.where(defined, 1e-9 * (1 + np.abs(value)), 0.0)
         assert (~defined | ((found[0] - slack <= value) & (value <= found[1] + slack))).all(), expression[-1]
+
+
+def test_a_check_that_fails_does_not_cost_the_result(monkeypatch):
+    """The difference is infinite, with a warning that says why."""
+    study = Study.from_system(driven_by(lambda t: 1.0))
+    expected = study.response_statistics([2.0]).std
+
+    def fail(options, flight):
+        raise IntegrationError("a tolerance cannot be met")
+
+    monkeypatch.setitem(ENGINES, "sweep", replace(ENGINES["sweep"], finer=fail))
+    with pytest.warns(UncheckedStatisticsWarning, match="could not be checked.*: a tolerance cannot be met"):
+        found = study.response_statistics([2.0], check=True)
+    np.testing.assert_array_equal(found.std, expected)
+    assert np.isinf(found["discretisation_difference"]).all()
