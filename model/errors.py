@@ -157,6 +157,10 @@ class OutputFolderError(AscentwindError):
     """Results cannot be written where they were asked for."""
 
 
+class UnusedOptionError(AscentwindError):
+    """An option was given that would change nothing."""
+
+
 class UnknownNameError(AscentwindError):
     """A name is not known; the nearest valid one is offered."""
 
@@ -183,6 +187,10 @@ class ExtrapolationWarning(AscentwindWarning):
 
 class PlausibilityWarning(AscentwindWarning):
     """Two statements of a vehicle's files hardly go together."""
+
+
+class WindWarning(AscentwindWarning):
+    """Mean, standard deviation and filter of a wind seem to be of different winds, or nobody can tell."""
 
 
 def suggestion(name: str, known: Iterable[str]) -> str:

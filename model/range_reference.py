@@ -15,8 +15,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import UnknownNameError
+from .errors import DataError, UnknownNameError
 from .wind_filter import TwoPartKernel
+from .wind_record import COMPONENTS as COMPONENTS
+from .wind_record import WindOrigin, WindRecord
 from .wind_statistics import REPORT_SAMPLES, TwoComponentStatistics, WindStatistics
 
 WIND_DATA = Path(__file__).parent / "wind_data"
@@ -25,10 +27,12 @@ MONTHS = (
     "july", "august", "september", "october", "november", "december",
 )  # fmt: skip
 PERIODS = (*MONTHS, "annual")
-COMPONENTS = ("zonal", "meridional")
+SITE = "Cape Canaveral"
 EDITIONS = ("1983", "2006")
 LEVELS = {"850": 1530.0, "700": 3140.0, "500": 5830.0, "250": 10720.0}  # pressure in hPa: altitude in m
 LAYER = "L1000_700"  # mean over the layer of 1000 to 700 hPa, 100 to 3100 m
+SAME_LEVEL = 0.5  # m
+ROUNDING = 0.011  # m/s, of tables with two decimals
 KERNELS = "interlevel_kernels.csv"
 
 
@@ -72,6 +76,42 @@ def range_reference(period: str = "march", edition: str = "1983") -> RangeRefere
         column("correlation_uv [1]"),
         column("observations [1]"),
     )
+
+
+def check_against_edition(
+    record: WindRecord, altitude: NDArray[np.float64], mean: NDArray[np.float64], deviation: NDArray[np.float64]
+) -> None:
+    """Refuse a mean and standard deviation that a record gives to a shipped edition which has other ones.
+
+    Parameters
+    ----------
+    record : WindRecord
+        Of another site or of soundings: nothing is known to compare with.
+    altitude : (k,) array
+        m.
+    mean, deviation : (k,) arrays
+        m/s.
+
+    Raises
+    ------
+    DataError
+    """
+    origin = record.origin
+    if origin.site != SITE or origin.edition not in EDITIONS:
+        return
+    table = range_reference(origin.period, origin.edition)
+    for what, values, wanted in (
+        ("mean", mean, record.sign * table.mean[origin.component]),
+        ("standard deviation", deviation, table.standard_deviation[origin.component]),
+    ):
+        for h, value in zip(altitude, values, strict=True):
+            i = int(np.argmin(np.abs(table.altitude - h)))
+            if abs(table.altitude[i] - h) > SAME_LEVEL or abs(value - wanted[i]) > ROUNDING:
+                has = f"{wanted[i]:g} m/s" if abs(table.altitude[i] - h) <= SAME_LEVEL else "no such level"
+                raise DataError(
+                    f"the {what} at {h:g} m is {value:g} m/s, but the record says {origin}, which has {has}; write "
+                    "another wind with 'ascentwind wind apply', or remove [wind.record] if the table is your own"
+                )
 
 
 @lru_cache
@@ -129,9 +169,16 @@ def shipped_statistics(
     Raises
     ------
     UnknownNameError
+    DataError
+        A highest level above the table's.
     """
     kernel = interlevel_kernel(period, component, third_order)
     table = range_reference(period, edition)
+    if not table.altitude[0] < top <= table.altitude[-1]:
+        raise DataError(
+            f"the levels of edition {edition} go from {table.altitude[0]:g} to {table.altitude[-1]:g} m; {top:g} m is "
+            "not among them, choose another top"
+        )
     keep = [0]
     for i, h in enumerate(table.altitude):
         # the first level is the surface at 3 m: the next ones count from round numbers
@@ -145,7 +192,8 @@ def shipped_statistics(
         table.standard_deviation[component][keep],
         kernel.correlation(h),
         REPORT_SAMPLES,
-        f"Range Reference Atmosphere, Cape Canaveral, edition {edition}; correlation {kernel.source}",
+        f"Range Reference Atmosphere, {SITE}, edition {edition}; correlation {kernel.source}",
+        WindOrigin(SITE, component, period, edition),
     )
 
 

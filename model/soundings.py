@@ -13,8 +13,16 @@ from numpy.typing import NDArray
 
 from .errors import DataError, suggestion
 from .numbers import parse_number
-from .wind_statistics import TwoComponentStatistics, WindStatistics
+from .wind_record import WindOrigin
+from .wind_statistics import LARGEST_ALTITUDE, LOWEST_ALTITUDE, TwoComponentStatistics, WindStatistics
 
+CODES = (88.8, 88.88, 99.0, 99.9, 99.99, 777.7, 888.8, 999.0, 999.9, 999.99, 9999.0, 9999.9, 32767.0, 99999.0)
+CODE_DISTANCE = 4.0  # robust standard deviations from the level's median: nearer, 99 m/s is a jet
+CODE_SHARE = 0.1  # of the profiles that hold one and the same code at a level: then the median is one too
+OUTLIER_DISTANCE = 10.0  # robust standard deviations
+SMALLEST_SPREAD = 0.5  # m/s, of a level that is often calm
+LARGEST_SPEED = 150.0  # m/s; the strongest jets measured stay below
+SHOWN = 5  # faults named in one message
 COLUMNS = ("profile", "date", "altitude [m]", "u [m/s]", "v [m/s]")
 FEWEST = 10  # profiles
 
@@ -32,7 +40,7 @@ class Soundings:
     day : (n,) array
         Days since some day, NaN where the file has no dates.
     dropped : int
-        Profiles left out because they lack a level.
+        Profiles left out because they lack a level, or hold a missing-value code in its place.
     source : str
     """
 
@@ -43,8 +51,23 @@ class Soundings:
     dropped: int
     source: str
 
-    def statistics(self, name: str) -> TwoComponentStatistics:
-        """Return mean, covariance and cross correlation, with the number of independent samples of each component."""
+    @property
+    def period(self) -> str:
+        """The first and last day, or 'days not stated'."""
+        days = self.day[np.isfinite(self.day)].astype(int)
+        if not days.size:
+            return "days not stated"
+        return " to ".join(datetime.date.fromordinal(int(d)).isoformat() for d in (days.min(), days.max()))
+
+    def statistics(self, name: str, site: str | None = None) -> TwoComponentStatistics:
+        """Return mean, covariance and cross correlation, with the number of independent samples of each component.
+
+        Parameters
+        ----------
+        name : str
+        site : str, optional
+            Where they were taken; with it the statistics know their origin.
+        """
         k = self.altitude.size
         both = np.hstack([self.u, self.v])
         correlation = np.asarray(np.corrcoef(both, rowvar=False))
@@ -60,6 +83,7 @@ class Soundings:
                     correlation[i, i],
                     independent_samples(values, self.day),
                     f"{self.source}, {len(values)} profiles",
+                    None if site is None else WindOrigin(site, component, self.period, self.source),
                 )
             )
         cross = correlation[:k, k:]
@@ -106,7 +130,8 @@ def read_soundings(file: Path, drop_incomplete: bool = False) -> Soundings:
     Raises
     ------
     DataError
-        Missing file or column, a unit other than SI, a value that is no number, a missing or repeated level.
+        Missing file or column, a unit other than SI, a value that is no number, a missing or repeated level, a
+        missing-value code such as -9999 or 99.9 (left out with ``drop_incomplete``), an outlier.
     """
     try:
         text = file.read_text(encoding="utf-8-sig")
@@ -125,6 +150,7 @@ def read_soundings(file: Path, drop_incomplete: bool = False) -> Soundings:
             raise DataError(f"column '{column}' is missing{suggestion(column, header)}; convert to SI units", file=file)
     index = {column: header.index(column) for column in COLUMNS if column in header}
     profiles: dict[str, dict[float, tuple[float, float]]] = {}
+    lines: dict[tuple[str, float], int] = {}
     dates: dict[str, float] = {}
     last = None
     for line, cells in rows[1:]:
@@ -138,9 +164,26 @@ def read_soundings(file: Path, drop_incomplete: bool = False) -> Soundings:
         levels = profiles.setdefault(name, {})
         if h in levels:
             raise DataError(f"profile '{name}' has the level {h:g} m twice", file=file, row=line)
+        if not LOWEST_ALTITUDE <= h <= LARGEST_ALTITUDE:
+            raise DataError(
+                f"{h:g} m is no altitude of a sounding; correct it, or remove the row if it stands for a missing value",
+                file=file,
+                column="altitude",
+                row=line,
+            )
         levels[h] = (u, v)
+        lines[name, h] = line
         dates[name] = _day(cells[index["date"]], file, line) if "date" in index else np.nan
     altitude = np.array(sorted({h for levels in profiles.values() for h in levels}))
+    codes = _refuse_outliers(profiles, altitude, lines, file)
+    if codes and not drop_incomplete:
+        raise DataError(
+            f"missing-value codes stand for wind: {_listed(codes, lines)}; interpolate them, or leave such profiles "
+            "out with drop_incomplete=True",
+            file=file,
+        )
+    for name, h, _ in codes:
+        profiles[name].pop(h, None)
     kept = {n: levels for n, levels in profiles.items() if len(levels) == altitude.size}
     if len(kept) < len(profiles) and not drop_incomplete:
         name = next(n for n in profiles if n not in kept)
@@ -157,6 +200,46 @@ def read_soundings(file: Path, drop_incomplete: bool = False) -> Soundings:
     return Soundings(
         altitude, data[:, :, 0], data[:, :, 1], day, len(profiles) - len(kept), f"soundings of {file.name}"
     )
+
+
+Fault = tuple[str, float, float]  # profile, altitude (m), value (m/s)
+
+
+def _refuse_outliers(
+    profiles: dict[str, dict[float, tuple[float, float]]],
+    altitude: NDArray[np.float64],
+    lines: dict[tuple[str, float], int],
+    file: Path,
+) -> list[Fault]:
+    """Return the values that stand for missing ones; refuse others that no wind of their level has."""
+    codes: list[Fault] = []
+    outliers: list[Fault] = []
+    for h in altitude:
+        names = [name for name, levels in profiles.items() if h in levels]
+        for values in np.array([profiles[name][h] for name in names]).T:
+            middle = float(np.median(values))
+            spread = max(1.4826 * float(np.median(np.abs(values - middle))), SMALLEST_SPREAD)
+            distance = np.abs(values - middle) / spread
+            for i in np.flatnonzero((distance > CODE_DISTANCE) | (np.abs(values) > CODES[0] - 1)):
+                fault = (names[i], float(h), float(values[i]))
+                frequent = np.mean(values == values[i]) > CODE_SHARE
+                if np.isclose(abs(values[i]), CODES, rtol=0, atol=1e-6).any() and (
+                    frequent or distance[i] > CODE_DISTANCE
+                ):
+                    codes.append(fault)
+                elif distance[i] > OUTLIER_DISTANCE or abs(values[i]) > LARGEST_SPEED:
+                    outliers.append(fault)
+    if outliers:
+        raise DataError(
+            f"values that are no wind: {_listed(outliers, lines)}; correct them or remove their profiles", file=file
+        )
+    return codes
+
+
+def _listed(faults: list[Fault], lines: dict[tuple[str, float], int]) -> str:
+    named = [f"{value:g} m/s at {h:g} m (line {lines[name, h]})" for name, h, value in faults[:SHOWN]]
+    more = f" and {len(faults) - SHOWN} more" if len(faults) > SHOWN else ""
+    return ", ".join(named) + more
 
 
 def _number(cell: str, column: str, file: Path, line: int) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,14 +11,16 @@ from typing import Any
 
 import numpy as np
 
+from .coverage import check_schedule, check_wind, loaded_flight
 from .csv_table import CsvTable, read_csv_table
-from .errors import DataError, DataErrorCollector, suggestion
+from .errors import DataError, DataErrorCollector, WindWarning, suggestion
 from .folder_files import file_inside
 from .load_relief import SCHEDULE_COLUMNS, mode_columns
 from .loads import REACTION_COLUMNS, load_columns
 from .local_aerodynamics import PREFIX, local_columns, local_load_columns
 from .noise_loads import MOVED_LINE, MOVED_MODE, check_noises, form_of_tables, needed_columns
 from .plausibility import check_plausibility
+from .range_reference import check_against_edition
 from .switches import switch_times
 from .tables import Table
 from .vehicle_file import (
@@ -28,12 +31,14 @@ from .vehicle_file import (
     TransferFunctionEntry,
     VehicleFile,
     WindEntry,
+    WindRecordEntry,
     read_vehicle_file,
 )
 from .vehicle_names import name_faults
 from .wind_filter import TwoPartKernel
 from .wind_filter_file import read_filter
-from .wind_statistics import WindModel, closed_form_filter, report_standard_deviation
+from .wind_record import WindOrigin, WindRecord
+from .wind_statistics import WindModel, check_plausible, closed_form_filter, report_standard_deviation
 
 VEHICLE_FILE = "vehicle.toml"
 
@@ -129,11 +134,18 @@ def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehi
     ------
     DataError
         Names the file, column and row at fault.
+
+    Warns
+    -----
+    ExtrapolationWarning, WindWarning
+        A schedule or the wind is held where the flight is loaded; mean and filter of the wind do not fit together, or
+        have no record.
     """
     toml = folder / VEHICLE_FILE
     if not toml.is_file():
         raise DataError(f"holds no {VEHICLE_FILE}; start from 'ascentwind new-vehicle DIR --from as504'", file=folder)
     file = read_vehicle_file(file_inside(folder, VEHICLE_FILE), changes)
+    _refuse_unused(changes or {}, file, toml)
     reader = _Reader(folder, toml, file)
     reader.collector.errors += [DataError(why, file=toml, column=key) for key, why in name_faults(file)]
     for name, columns in (
@@ -206,6 +218,7 @@ def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehi
         sources=tuple(reader.sources),
     )
     check_plausibility(vehicle)
+    _check_coverage(reader, wind, start, last.last)
     return vehicle
 
 
@@ -218,6 +231,23 @@ def _with_noise_loads(file: VehicleFile, folder: Path, toml: Path) -> VehicleFil
     if warning is not None:
         warnings.warn(warning, stacklevel=3)
     return file.model_copy(update={"options": file.options.model_copy(update={"noise_loads": form})})
+
+
+def _refuse_unused(changes: Mapping[str, Any], file: VehicleFile, toml: Path) -> None:
+    """Refuse changes to what the vehicle's options leave aside."""
+    for key in changes:
+        parts = key.split(".")
+        for idle, concerned, why in (
+            (not file.wind.fitted, parts[:2] == ["wind", "filter"], 'wind.synthesis = "fitted"'),
+            (file.wind.fitted, parts[:2] == ["wind", "correlation"], 'wind.synthesis = "closed_form"'),
+            (
+                not file.options.local_angle_of_attack,
+                "local_aerodynamics" in parts or (parts[0] == "loads" and "local" in parts),
+                "options.local_angle_of_attack = true",
+            ),
+        ):
+            if idle and concerned:
+                raise DataError(f"changes nothing here; it is used with {why}", file=toml, column=key)
 
 
 def _add_load_relief(reader: _Reader, file: VehicleFile) -> None:
@@ -260,6 +290,7 @@ class _Reader:
         self.sources: list[TableSource] = []
         self.discontinuities: set[float] = set()
         self.collector = DataErrorCollector()
+        self.schedules: dict[str, tuple[Table, Path]] = {}
 
     def read(self, name: str, entry: TableEntry, columns, argument: str, unit: str, unused=()) -> CsvTable:
         csv = read_csv_table(file_inside(self.folder, entry.file), argument, unit)
@@ -307,6 +338,8 @@ class _Reader:
             except DataError as error:
                 raise DataError(error.why, file=csv.file, column=column, time=error.time) from None
             self.tables[table.name] = table
+            if name.startswith("control."):
+                self.schedules[name] = (table, csv.file)
 
     def _check_between_rows(self, table: Table, sign: str) -> None:
         """Refuse an interpolation that leaves the range its rows keep, and an altitude that does not increase."""
@@ -345,26 +378,65 @@ def _bending_columns(tanks: list[str]):
 
 def _load_wind(folder: Path, entry: WindEntry, reader: _Reader) -> WindModel:
     csv = reader.read("wind", entry.statistics, WIND, "altitude", "m")
-    h, interpolation = csv.columns["altitude"], entry.statistics.interpolation
-    mean = Table("wind.mean", "m/s", h, csv.columns["mean"], interpolation)
+    h, mean, sigma = (csv.columns[name] for name in ("altitude", "mean", "standard_deviation"))
+    record = _wind_record(entry.record, reader.toml)
+    try:
+        check_plausible("the wind's statistics", h, mean, sigma)
+        if record is not None:
+            check_against_edition(record, h, mean, sigma)
+    except DataError as error:
+        raise DataError(error.why, file=csv.file) from None
+    if entry.standard_deviation == "cr103010_fit":
+        sigma = report_standard_deviation(h)
+    interpolation = entry.statistics.interpolation
+    mean_table = Table("wind.mean", "m/s", h, mean, interpolation)
+    deviation = Table("wind.standard_deviation", "m/s", h, sigma, interpolation)
     if entry.fitted:
         assert entry.filter is not None  # checked by WindEntry
         file = file_inside(folder, entry.filter)
         shaping_filter = read_filter(file)
         low, high = (float(x) for x in shaping_filter.altitude[[0, -1]])
         reader.sources.append(TableSource("wind.filter", file, "computed", shaping_filter.source, low, high))
-        return WindModel(mean, shaping_filter)
-    assert entry.correlation is not None
-    sigma = csv.columns["standard_deviation"]
-    if entry.standard_deviation == "cr103010_fit":
-        sigma = report_standard_deviation(h)
-    knots = entry.correlation
-    kernel = TwoPartKernel(
-        *(
-            (np.array(profile.altitude_m), np.array(profile.value))
-            for profile in (knots.long_scale_m, knots.short_scale_m, knots.short_fraction)
-        ),
-        source=knots.source,
-    )
-    deviation = Table("wind.standard_deviation", "m/s", h, sigma, interpolation)
-    return WindModel(mean, closed_form_filter(kernel, deviation))
+    else:
+        assert entry.correlation is not None
+        knots, file = entry.correlation, reader.toml
+        kernel = TwoPartKernel(
+            *(
+                (np.array(profile.altitude_m), np.array(profile.value))
+                for profile in (knots.long_scale_m, knots.short_scale_m, knots.short_fraction)
+            ),
+            source=knots.source,
+        )
+        shaping_filter = closed_form_filter(kernel, deviation)
+    try:
+        return WindModel(mean_table, shaping_filter, deviation, record)
+    except DataError as error:
+        raise DataError(error.why, file=file) from None
+
+
+def _wind_record(entry: WindRecordEntry | None, toml: Path) -> WindRecord | None:
+    if entry is None:
+        warnings.warn(
+            WindWarning(
+                f"{toml} holds no [wind.record]: nobody can tell whether mean and filter are of one wind; 'ascentwind "
+                "wind apply VEHICLE --component zonal|meridional' writes filter, mean and record together"
+            ),
+            stacklevel=4,
+        )
+        return None
+    origin = WindOrigin(entry.site, entry.component, entry.period, entry.edition)
+    try:
+        return WindRecord(origin, math.radians(entry.azimuth_deg), entry.sign, entry.held_above_m, entry.source)
+    except DataError as error:
+        raise DataError(error.why, file=toml, column="wind.record") from None
+
+
+def _check_coverage(reader: _Reader, wind: WindModel, start: float, end: float) -> None:
+    """Hold schedules of the control system and the wind against the part of the flight that they must cover."""
+    flight = loaded_flight(reader.tables, start, end)
+    for name, (table, file) in reader.schedules.items():
+        check_schedule(name, table, flight, file)
+    try:
+        check_wind(wind, flight)
+    except DataError as error:
+        raise DataError(error.why, file=reader.toml, column="wind") from None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
@@ -144,6 +144,19 @@ class CorrelationEntry(Section):
         return self
 
 
+class WindRecordEntry(Section):
+    """Of which wind statistics and filter are; written by 'ascentwind wind apply'."""
+
+    site: str
+    component: Literal["zonal", "meridional"]
+    period: str
+    edition: str
+    azimuth_deg: Annotated[float, Field(ge=-360, le=360)]
+    sign: Literal[1, -1]
+    held_above_m: float
+    source: str
+
+
 class WindEntry(Section):
     """``synthesis`` chooses between ``filter``, a file of 'ascentwind wind fit', and [wind.correlation]."""
 
@@ -152,6 +165,7 @@ class WindEntry(Section):
     standard_deviation: Literal["table", "cr103010_fit"] = "table"
     filter: FileName | None = None
     correlation: CorrelationEntry | None = None
+    record: WindRecordEntry | None = None
 
     @model_validator(mode="after")
     def _one_filter(self):

@@ -17,6 +17,7 @@ from scipy.special import gamma, kv
 
 from .errors import DataError
 from .tables import Table, TableGroup
+from .wind_record import WindOrigin
 
 _SQRT3 = np.sqrt(3.0)
 
@@ -42,6 +43,8 @@ class ShapingFilter:
         Altitudes at which a coefficient has a corner; must be samples.
     source : str
         Where the filter comes from.
+    origin : WindOrigin, optional
+        The statistics that it was fitted to.
 
     Raises
     ------
@@ -57,6 +60,7 @@ class ShapingFilter:
     start_covariance: NDArray[np.float64]
     kinks: tuple[float, ...] = ()
     source: str = ""
+    origin: WindOrigin | None = None
 
     def __post_init__(self):
         if self.altitude.ndim != 1 or self.start_covariance.ndim != 2 or not self.start_covariance.size:

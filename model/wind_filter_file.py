@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from .errors import DataError
 from .text_file import read_text
 from .wind_filter import ShapingFilter
+from .wind_record import WindOrigin
 
 FORMAT = 1
 KEYS = ("altitude_m", "F_per_m", "G_per_root_m", "H_m_per_s", "start_covariance", "kinks_m")
@@ -22,7 +24,9 @@ def filter_text(shaping_filter: ShapingFilter) -> str:
     """Return a filter as JSON; numbers keep all their digits."""
     f = shaping_filter
     arrays = (f.altitude, f.F, f.G, f.H, f.start_covariance, np.array(f.kinks))
-    head = {"format": FORMAT, "name": f.name, "source": f.source}
+    head: dict[str, object] = {"format": FORMAT, "name": f.name, "source": f.source}
+    if f.origin is not None:
+        head["origin"] = asdict(f.origin)
     lines = [f"  {json.dumps(k)}: {json.dumps(v)}" for k, v in head.items()]
     lines += [f"  {json.dumps(k)}: {json.dumps(a.tolist())}" for k, a in zip(KEYS, arrays, strict=True)]
     return "{\n" + ",\n".join(lines) + "\n}\n"
@@ -41,7 +45,9 @@ def read_filter(file: Path) -> ShapingFilter:
         if data.get("format") != FORMAT or isinstance(data["format"], bool):
             raise DataError(f"has format {data.get('format')!r}; this version reads {FORMAT}", file=file)
         altitude, F, G, H, start, kinks = (_numbers(data[k], k) for k in KEYS)
-        return ShapingFilter(str(data["name"]), altitude, F, G, H, start, tuple(kinks.tolist()), str(data["source"]))
+        return ShapingFilter(
+            str(data["name"]), altitude, F, G, H, start, tuple(kinks.tolist()), str(data["source"]), _origin(data)
+        )
     except KeyError as error:
         raise DataError(f"lacks {error}; write filters with 'ascentwind wind fit'", file=file) from None
     except (ValueError, TypeError, AttributeError, IndexError, OverflowError) as error:
@@ -75,3 +81,7 @@ def _numbers(value: Any, key: str) -> NDArray[np.float64]:
         elif isinstance(item, bool) or not isinstance(item, int | float) or not math.isfinite(item):
             raise ValueError(f"'{key}' holds {json.dumps(item)[:40]}, which is not a finite number")
     return np.array(value, float)
+
+
+def _origin(data: dict[str, dict[str, str]]) -> WindOrigin | None:
+    return None if "origin" not in data else WindOrigin(**{key: str(value) for key, value in data["origin"].items()})

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,12 +12,14 @@ from .correlation_matrix import RepairWarning, check_correlation, nearest_correl
 from .errors import DataError
 from .tables import Table
 from .wind_filter import ShapingFilter, TwoPartKernel
+from .wind_record import WindOrigin, WindRecord
 
 FILTER_SPACING = 250.0  # m, of the samples on which a closed-form filter is tabulated
 REPORT_SAMPLES = 80  # independent soundings behind the report's March statistics, section 3.2
 
 # No climatology of the lowest 40 km comes near these; knots, feet a second or feet read as SI do.
-LARGEST_MEAN, LARGEST_DEVIATION, LARGEST_ALTITUDE, SMALLEST_RANGE = 100.0, 26.0, 40e3, 100.0
+LARGEST_MEAN, LARGEST_DEVIATION, SMALLEST_RANGE = 100.0, 26.0, 100.0
+LOWEST_ALTITUDE, LARGEST_ALTITUDE = -500.0, 40e3
 
 
 def report_standard_deviation(altitude: ArrayLike) -> NDArray[np.float64]:
@@ -33,10 +35,36 @@ def report_standard_deviation(altitude: ArrayLike) -> NDArray[np.float64]:
 
 @dataclass(frozen=True, eq=False)
 class WindModel:
-    """The mean wind over altitude (m, m/s) and the filter for its variations."""
+    """One wind: the mean over altitude and the filter for its variations, of the same statistics.
+
+    Parameters
+    ----------
+    mean : Table
+        m/s over m.
+    shaping_filter : ShapingFilter
+    standard_deviation : Table, optional
+        m/s over m; what the filter's own is compared with.
+    record : WindRecord, optional
+        Of which statistics the three are, and how they are taken across the flight.
+
+    Raises
+    ------
+    DataError
+        A filter of other statistics than the record's.
+    """
 
     mean: Table
     shaping_filter: ShapingFilter
+    standard_deviation: Table | None = None
+    record: WindRecord | None = None
+
+    def __post_init__(self):
+        made_for = self.shaping_filter.origin
+        if self.record is not None and made_for is not None and made_for != self.record.origin:
+            raise DataError(
+                f"the filter was fitted to {made_for}, but mean and standard deviation are recorded as those of "
+                f"{self.record.origin}; 'ascentwind wind apply' writes filter, mean and record of one wind"
+            )
 
 
 def closed_form_filter(kernel: TwoPartKernel, standard_deviation: Table, top: float | None = None) -> ShapingFilter:
@@ -69,6 +97,7 @@ class WindStatistics:
     independent_samples : float
         Soundings behind the numbers, reduced for their correlation from day to day.
     source : str
+    origin : WindOrigin, optional
 
     Raises
     ------
@@ -83,6 +112,7 @@ class WindStatistics:
     correlation: NDArray[np.float64]
     independent_samples: float = REPORT_SAMPLES
     source: str = ""
+    origin: WindOrigin | None = None
 
     def __post_init__(self):
         for label in ("altitude", "mean", "standard_deviation", "correlation"):
@@ -101,7 +131,7 @@ class WindStatistics:
                 )
         if not np.isfinite(h).all() or not (np.diff(h) > 0).all():
             raise DataError(f"wind statistics '{self.name}': altitudes must be finite and increase")
-        _check_plausible(self.name, h, self.mean, self.standard_deviation)
+        check_plausible(f"wind statistics '{self.name}'", h, self.mean, self.standard_deviation)
         if self.correlation.shape != (k, k):
             raise DataError(f"wind statistics '{self.name}': correlation {self.correlation.shape} for {k} altitudes")
         check_correlation(self.correlation, f"the correlation of wind statistics '{self.name}'")
@@ -127,14 +157,12 @@ class WindStatistics:
                 f"wind statistics '{self.name}' hold {i.size} levels between {low:g} and {high:g} m; they cover "
                 f"{self.altitude[0]:g} to {self.altitude[-1]:g} m"
             )
-        return WindStatistics(
-            self.name,
-            self.altitude[i],
-            self.mean[i],
-            self.standard_deviation[i],
-            self.correlation[np.ix_(i, i)],
-            self.independent_samples,
-            self.source,
+        return replace(
+            self,
+            altitude=self.altitude[i],
+            mean=self.mean[i],
+            standard_deviation=self.standard_deviation[i],
+            correlation=self.correlation[np.ix_(i, i)],
         )
 
     def mean_table(self) -> Table:
@@ -230,9 +258,14 @@ class TwoComponentStatistics:
             )
 
 
-def _check_plausible(name: str, altitude: NDArray, mean: NDArray, deviation: NDArray) -> None:
-    where = f"wind statistics '{name}'"
-    if altitude[0] < -500 or altitude[-1] > LARGEST_ALTITUDE:
+def check_plausible(where: str, altitude: NDArray, mean: NDArray, deviation: NDArray) -> None:
+    """Refuse altitudes (m), means and standard deviations (m/s) that no wind has; ``where`` begins the sentence.
+
+    Raises
+    ------
+    DataError
+    """
+    if altitude[0] < LOWEST_ALTITUDE or altitude[-1] > LARGEST_ALTITUDE:
         raise DataError(
             f"{where} run from {altitude[0]:g} to {altitude[-1]:g} m; are these feet? Convert them to metres"
         )

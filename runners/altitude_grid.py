@@ -12,11 +12,12 @@ from scipy.interpolate import CubicSpline, PPoly
 from scipy.linalg import expm
 
 from ..model.wind_filter import ShapingFilter
+from ..model.wind_propagation import GAUSS as GAUSS
+from ..model.wind_propagation import divided as divided
 from ..model.wind_statistics import WindStatistics
 
 KNOT_SPACING = 1000.0  # m, least distance of the knots of a coefficient
 SAMPLE_SPACING = 62.5  # m, at most, of the samples of a fitted filter
-GAUSS = 0.5 / np.sqrt(3.0)
 
 Matrices = Callable[[float], tuple[NDArray, NDArray]]
 
@@ -29,13 +30,6 @@ def knots_for(altitude: NDArray[np.float64]) -> NDArray[np.float64]:
             knots.append(h)
     knots[-1] = altitude[-1]
     return np.array(knots) if len(knots) > 2 else altitude[[0, -1]]
-
-
-def divided(altitude: NDArray[np.float64], spacing: float) -> list[NDArray[np.float64]]:
-    """Divide each interval between altitudes equally, into steps of at most ``spacing``; one array of edges each."""
-    return [
-        np.linspace(a, b, max(1, int(np.ceil((b - a) / spacing - 1e-9))) + 1) for a, b in itertools.pairwise(altitude)
-    ]
 
 
 def dense_samples(altitude: NDArray[np.float64]) -> NDArray[np.float64]:

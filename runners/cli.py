@@ -13,7 +13,7 @@ from rich.logging import RichHandler
 from rich.table import Table
 from rich.text import Text
 
-from ..model.errors import AscentwindError, AscentwindWarning
+from ..model.errors import AscentwindError, AscentwindWarning, UnusedOptionError
 from .cli_build import build_vehicle
 from .cli_checks import equations, sensitivity, tolerance, verify
 from .cli_design import design
@@ -84,8 +84,11 @@ def run(
     folder = out or results_folder(vehicle, "results")
     settings = {"method": method, "relative_tolerance": tolerance}
     engine_options(engine, **settings)  # refused before anything is computed
+    wanted = parse_changes(changes or [])
+    if times and "default_times" in wanted:
+        raise UnusedOptionError("--set default_times is not used with --times; leave one of them out")
     with console.status("loading and preparing code"):
-        study = Study.load(vehicle, changes=parse_changes(changes or []))
+        study = Study.load(vehicle, changes=wanted)
     assert study.vehicle is not None
     engine, options = engine_options(engine, compiled=study.executable.shared_library is not None, **settings)
     end_times = parse_times(times or study.vehicle.file.default_times)

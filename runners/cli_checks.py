@@ -11,12 +11,13 @@ from rich.table import Table
 
 from ..model.errors import DataError
 from .larger_side import LARGER_SIDE
-from .terminal import VehicleArgument, console, progress_bar, results_folder
+from .terminal import VehicleArgument, console, progress_bar, refuse_unused, results_folder
 
 WIDE = 150  # columns: tables that a narrow terminal wraps but a file keeps whole
 
 
 def sensitivity(
+    context: typer.Context,
     vehicle: VehicleArgument,
     response: Annotated[str | None, typer.Option(help="Response; the vehicle's first without it.")] = None,
     time: Annotated[str, typer.Option(help="End time in s, or 'peak'.")] = "peak",
@@ -34,6 +35,8 @@ def sensitivity(
     from .times import parse_time_or_peak
 
     at = parse_time_or_peak(time)
+    if quantity == "mean":
+        refuse_unused(context, ["source"], "with --quantity mean, to which no noise contributes")
     folder = out or results_folder(vehicle, "sensitivity")
     with console.status("loading and preparing code"):
         study = Study.load(vehicle)
@@ -49,6 +52,7 @@ def sensitivity(
 
 
 def equations(
+    context: typer.Context,
     vehicle: VehicleArgument = "as504",
     of: Annotated[
         str | None,
@@ -65,6 +69,8 @@ def equations(
 
     if by is not None and of is None:
         raise DataError(f"--by {by} needs --of, the equation to differentiate; 4-1 to 4-13, an output or a state")
+    if page is not None:
+        refuse_unused(context, ["of", "by"], "with --page, which holds all equations")
     study = Study.load(vehicle)
     if page is not None:
         text = equations_page(study)

@@ -7,10 +7,11 @@ from typing import Annotated
 
 import typer
 
-from .terminal import console, progress_bar
+from .terminal import console, progress_bar, refuse_unused
 
 
 def design(
+    context: typer.Context,
     task: Annotated[
         str, typer.Argument(help="A design file (docs/design.md), or a vehicle whose folder holds design.toml.")
     ],
@@ -28,6 +29,8 @@ def design(
     file = find_design(task)
     with console.status("loading and preparing code"):
         loaded = load_design(file)
+    if loaded.trade is None:
+        refuse_unused(context, ["trades"], f"with {file}, which has no [trade]")
     folder = out or Path(f"{loaded.problem.study.system.name}-design")
     prepare_folder(folder)
     with console.status("designing") as status:

@@ -1,14 +1,19 @@
-"""The command line of the wind: ``ascentwind wind stats``, ``fit``, ``check``, ``plot`` and ``compare``."""
+"""The command line of the wind: ``ascentwind wind apply``, ``stats``, ``fit``, ``check``, ``plot`` and ``compare``."""
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.table import Table
 
-from .terminal import VehicleArgument, console
+from ..model.errors import DataError, OutputFolderError
+from .terminal import VehicleArgument, console, given, refuse_unused
+
+if TYPE_CHECKING:
+    from ..model.wind_filter import ShapingFilter
 
 app = typer.Typer(no_args_is_help=True, help="Wind statistics, and filters that turn white noise into that wind.")
 
@@ -20,7 +25,19 @@ Soundings = Annotated[Path | None, typer.Option(help="CSV of soundings instead o
 Out = Annotated[Path, typer.Option(help="Folder for results.")]
 
 
-def _statistics(period: str, component: str, edition: str, top: float, soundings: Path | None):
+TOP = 30000.0  # m, of the shipped tables
+
+
+def _statistics(
+    context: typer.Context,
+    period: str,
+    component: str,
+    edition: str,
+    top: float,
+    soundings: Path | None,
+    site: str | None = None,
+):
+    """Return the statistics that the options name; ``site`` is that of the soundings."""
     from ..model.errors import UnknownNameError
     from ..model.range_reference import COMPONENTS, shipped_statistics
     from ..model.soundings import read_soundings
@@ -28,15 +45,95 @@ def _statistics(period: str, component: str, edition: str, top: float, soundings
     if component not in COMPONENTS:
         raise UnknownNameError("wind component", component, COMPONENTS)
     if soundings is None:
+        refuse_unused(context, ["site"], "without --soundings: the shipped tables are of Cape Canaveral")
         return shipped_statistics(period, component, edition=edition, top=top)
+    refuse_unused(context, ["period", "edition"], "with --soundings, whose days the statistics are of")
     read = read_soundings(soundings, drop_incomplete=True)
     if read.dropped:
         console.print(f"{read.dropped} incomplete profiles left out", style="dim")
-    return getattr(read.statistics(soundings.stem), component)
+    found = getattr(read.statistics(soundings.stem, site), component)
+    return found.between(-math.inf, top) if given(context, "top") else found
+
+
+def _statistics_of(
+    context: typer.Context,
+    shaping_filter: ShapingFilter,
+    period: str,
+    component: str,
+    edition: str,
+    top: float,
+    soundings: Path | None,
+):
+    """Return the statistics that the options name, and where they are silent those that the filter was fitted to."""
+    from ..model.range_reference import EDITIONS
+
+    origin = shaping_filter.origin
+    if origin is not None:
+        component = component if given(context, "component") else origin.component
+        period = period if given(context, "period") else origin.period
+        edition = edition if given(context, "edition") else origin.edition
+        if soundings is None and edition not in EDITIONS:
+            raise DataError(
+                f"filter '{shaping_filter.name}' was fitted to {origin}; give --soundings, or --period and "
+                "--edition of a shipped table"
+            )
+    return _statistics(context, period, component, edition, top, soundings)
+
+
+@app.command()
+def apply(
+    context: typer.Context,
+    vehicle: Annotated[str, typer.Argument(help="Vehicle folder; its vehicle.toml is changed.")],
+    component: Component,
+    azimuth: Annotated[
+        float | None,
+        typer.Option(help="Of the flight, deg from north towards east; construction.toml's without it."),
+    ] = None,
+    sign: Annotated[
+        int, typer.Option(help="1: +Y is the component's positive direction, east or north; -1: west or south.")
+    ] = 1,
+    period: Period = "march",
+    edition: Edition = "1983",
+    soundings: Soundings = None,
+    site: Annotated[str | None, typer.Option(help="Of the soundings.")] = None,
+) -> None:
+    """Give a vehicle a wind: filter, mean, standard deviation and record together."""
+    from ..model.shipped import built_in_vehicles
+    from .fit_progress import fit_progress
+    from .least_squares import FitOptions
+    from .wind_apply import apply_wind, flight_azimuth
+
+    folder = Path(vehicle)
+    if not folder.is_dir() and vehicle in built_in_vehicles():
+        raise OutputFolderError(
+            f"'{vehicle}' ships with ascentwind; make a copy with 'ascentwind new-vehicle DIR --from {vehicle}'"
+        )
+    if soundings is not None and site is None:
+        raise DataError("soundings do not say where they were taken; give --site")
+    across = flight_azimuth(folder, azimuth)
+    s = _statistics(context, period, component, edition, TOP, soundings, site)
+    where = f"--soundings {soundings.name} --site '{site}'" if soundings else f"--period {period} --edition {edition}"
+    command = (
+        f"ascentwind wind apply --component {component} --azimuth {math.degrees(across):.9g} --sign {sign} {where}"
+    )
+    limit = FitOptions().time_limit
+    with fit_progress(console, f"filter for {s.name}", limit) as progress:
+        applied = apply_wind(folder, s, across, sign, command, FitOptions(progress=progress))
+    share = applied.record.share_across
+    for line in (
+        f"{s.name}: filter within {applied.fit.rms_error:.3g} m²/s² rms",
+        f"{', '.join(path.name for path in applied.files)} written in {folder}",
+        f"no longer used: {', '.join(applied.unused)}" if applied.unused else None,
+        f"{share:.0%} of the component is across a path of azimuth {math.degrees(across):g}°; the whole of it is taken",
+        f"the vehicle's title is still '{applied.title}'",
+    ):
+        if line:
+            console.print(line, soft_wrap=True, highlight=False, markup=False)
 
 
 @app.command()
 def stats(
+    context: typer.Context,
     period: Period = "march",
     component: Component = "zonal",
     edition: Edition = "1983",
@@ -48,7 +145,7 @@ def stats(
 
     from .covariance_intervals import covariance_interval
 
-    s = _statistics(period, component, edition, top, soundings)
+    s = _statistics(context, period, component, edition, top, soundings)
     low, high = covariance_interval(s.covariance, s.independent_samples)
     table = Table(title=f"{s.name}, {s.independent_samples:.0f} independent samples", caption=s.source)
     for column in ("altitude, m", "mean, m/s", "σ, m/s", "90 % interval", "correlation with the level below"):
@@ -62,6 +159,7 @@ def stats(
 
 @app.command()
 def fit(
+    context: typer.Context,
     period: Period = "march",
     component: Component = "zonal",
     edition: Edition = "1983",
@@ -75,7 +173,7 @@ def fit(
     time_limit: Annotated[float, typer.Option(help="Seconds.")] = 60.0,
     out: Annotated[Path, typer.Option(help="File for the filter.")] = Path("wind_filter.json"),
 ) -> None:
-    """Synthesise a filter and write it; \\[wind] of a vehicle takes it as filter = "FILE"."""
+    """Synthesise a filter by any method and write it; 'ascentwind wind apply' puts a whole wind into a vehicle."""
     from dataclasses import replace
 
     from ..model.wind_filter_file import filter_text
@@ -87,16 +185,18 @@ def fit(
 
     if noises != 1 and method != "state-space":
         raise SynthesisError(f"method '{method}' makes filters of one noise; take --method state-space")
+    if method == "linear-regression":
+        refuse_unused(context, ["time_limit"], "by linear regression, which optimises nothing")
     settings = {"noises": noises} if noises != 1 else {}
     prepare_folder(out.parent)
-    s = _statistics(period, component, edition, top, soundings)
+    s = _statistics(context, period, component, edition, top, soundings)
     with fit_progress(console, f"{method} for {s.name}", time_limit) as progress:
         result = synthesise(s, method, order, FitOptions(time_limit=time_limit, progress=progress), **settings)
     made = result.shaping_filter
     command = f"ascentwind wind fit --method {method} --order {made.order} --noises {made.noise_count}" + (
         f" --period {period} --component {component} --edition {edition} --top {top:g}"
         if soundings is None
-        else f" --soundings {soundings.name} --component {component}"
+        else f" --soundings {soundings.name} --component {component} --top {s.altitude[-1]:g}"
     )
     made = replace(made, source=f"{made.source}; written by '{command}'")
     write_whole(out, lambda p: p.write_text(filter_text(made), encoding="utf-8"))
@@ -111,6 +211,7 @@ def fit(
 
 @app.command()
 def check(
+    context: typer.Context,
     filter_file: Annotated[Path, typer.Argument(help="Filter written by 'ascentwind wind fit'.")],
     period: Period = "march",
     component: Component = "zonal",
@@ -124,7 +225,7 @@ def check(
     from .wind_verification import ensemble_share_inside, verify
 
     shaping_filter = read_filter(filter_file)
-    s = _statistics(period, component, edition, top, soundings)
+    s = _statistics_of(context, shaping_filter, period, component, edition, top, soundings)
     v = verify(shaping_filter, s)
     share = ensemble_share_inside(shaping_filter, v.covariance, s.altitude, profiles)
     table = Table("what", "found", title=f"{shaping_filter.name} against {s.name}")
@@ -138,6 +239,7 @@ def check(
 
 @app.command()
 def plot(
+    context: typer.Context,
     filter_file: Annotated[Path, typer.Argument(help="Filter written by 'ascentwind wind fit'.")],
     period: Period = "march",
     component: Component = "zonal",
@@ -161,7 +263,7 @@ def plot(
 
     prepare_folder(out)
     shaping_filter = read_filter(filter_file)
-    s = _statistics(period, component, edition, top, soundings)
+    s = _statistics_of(context, shaping_filter, period, component, edition, top, soundings)
     loaded = load_vehicle(find_vehicle(vehicle))
     time = np.linspace(loaded.start, loaded.end, 1000)
     altitude = loaded.tables["altitude"].polynomial(time)
@@ -184,33 +286,51 @@ def compare(
     response: Annotated[str, typer.Option(help="Response.")] = "bending_moment",
 ) -> None:
     """A response under different winds: months, editions, the closed form, and filters as poor as the report's."""
+    from dataclasses import replace
+
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
     from ..model.range_reference import shipped_statistics
+    from .figures import display, words
     from .fit_progress import fit_progress
     from .least_squares import FitOptions
     from .study import Study
     from .times import time_of_greatest_dynamic_pressure
-    from .wind_comparison import CASES, REPORT_ERRORS, TOP, compare_winds, shipped_winds, stretched_to_error
+    from .wind_comparison import (
+        CASES,
+        REPORT_ERRORS,
+        TOP,
+        compare_winds,
+        recorded_wind,
+        shipped_winds,
+        stretched_to_error,
+    )
 
     study = Study.load(vehicle)
     assert study.vehicle is not None
+    record = recorded_wind(study.vehicle)
+    component = record.origin.component
     time = time_of_greatest_dynamic_pressure(study.vehicle) if time is None else time
     limit = FitOptions().time_limit
     with fit_progress(console, "fitting filters", limit * len(CASES)) as fitting:
-        winds: dict = shipped_winds(FitOptions(progress=fitting))
-        march = shipped_statistics(top=TOP)
+        winds = shipped_winds(component, record.sign, FitOptions(progress=fitting))
+        march, fitted = shipped_statistics(component=component, top=TOP), winds["march, fitted"]
         for rms in REPORT_ERRORS:
-            poorer = stretched_to_error(winds["march, fitted"].shaping_filter, march, rms)
-            winds[f"march, wrong by {rms:.0f} m²/s² rms"] = poorer
+            poorer = stretched_to_error(fitted.shaping_filter, march, rms)
+            winds[f"march, wrong by {rms:.0f} m²/s² rms"] = replace(fitted, shaping_filter=poorer)
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     with Progress(*columns, console=console, transient=True) as bar:
         task = bar.add_task("responses", total=len(winds) + 1)
         found = compare_winds(study, winds, time, response, progress=lambda: bar.advance(task))
-    table = Table(title=f"{response} at {time:g} s, wind alone")
-    for column in ("wind", "mean", "σ", "variance against the first"):
+    factor, unit = display(found[0].unit, [c.deviation for c in found])
+    table = Table(
+        title=f"{words(response).capitalize()} at {time:g} s, {component} wind alone",
+        caption=f"as in the vehicle: {record.origin}; the others: Cape Canaveral, edition 1983 unless named",
+    )
+    for column in ("wind", f"mean, {unit}", f"σ, {unit}", "variance against the first"):
         table.add_column(column, justify="left" if column == "wind" else "right")
     for case in found:
         change = (case.deviation / found[0].deviation) ** 2 - 1
-        table.add_row(case.wind, f"{case.mean:.4g}", f"{case.deviation:.4g}", f"{100 * change:+.1f} %")
+        mean, sigma = (f"{factor * value:.4g}" for value in (case.mean, case.deviation))
+        table.add_row(case.wind, mean, sigma, f"{100 * change:+.1f} %")
     console.print(table)

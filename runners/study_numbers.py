@@ -13,19 +13,18 @@ from numpy.typing import NDArray
 
 from ..codegen.compiled import ExecutableSystem, executable_system
 from ..model.assemble import assemble
-from ..model.errors import ParameterValueError, TimeRangeError, UnknownNameError
+from ..model.coverage import check_wind, loaded_flight
+from ..model.errors import DataError, ParameterValueError, TimeRangeError, UnknownNameError
 from ..model.shipped import find_vehicle
 from ..model.system import LinearSystem, Parameter
 from ..model.tables import table_values
 from ..model.vehicle import Vehicle, load_vehicle
-from ..model.wind_filter import ShapingFilter
 from ..model.wind_statistics import WindModel
 from .mean_response import with_mean_tables
 from .planar_mean import with_nonlinear_mean
 from .stability import Root, check_coupling, matrices_at, roots
 from .sweep_engine import available_sweep, with_sweep_mean_tables
 from .time_nodes import on_flight
-from .wind_range import warn_beyond
 from .wind_start import covariance_at
 
 POSITIVE = ("correlation_time", "reference_area")
@@ -115,29 +114,36 @@ class StudyNumbers:
             values[names.index(name)] = number
         return values
 
-    def with_wind(self, wind: WindModel | ShapingFilter) -> Self:
+    def with_wind(self, wind: WindModel) -> Self:
         """Return a study of the same vehicle in another wind.
 
         Parameters
         ----------
-        wind : WindModel or ShapingFilter
-            A filter alone keeps the vehicle's mean wind.
+        wind : WindModel
+            Mean and filter of one wind.
 
         Raises
         ------
         UnknownNameError
             If the study has no vehicle.
+        DataError
+            A filter without its mean; a wind that the flight does not meet, or whose parts are of different winds.
 
         Warns
         -----
         ExtrapolationWarning
-            The flight leaves the filter's altitudes: its coefficients are held at their last values there.
+            The flight leaves the wind's altitudes where it is loaded: values are held at the last ones there.
+        WindWarning
+            The filter's standard deviation is more than a tenth from the table's.
         """
         if self.vehicle is None:
             raise UnknownNameError("wind of a system of one's own", self.system.name, [])
-        if isinstance(wind, ShapingFilter):
-            wind = WindModel(self.vehicle.wind.mean, wind)
-        warn_beyond(wind.shaping_filter, self.vehicle)
+        if not isinstance(wind, WindModel):
+            raise DataError(
+                f"a wind is a mean and a filter of the same statistics, and {type(wind).__name__} is not: give "
+                "WindModel(statistics.mean_table(), filter)"
+            )
+        check_wind(wind, loaded_flight(self.vehicle.tables, self.vehicle.start, self.vehicle.end))
         study = self.from_vehicle(replace(self.vehicle, wind=wind), compile=self.executable.shared_library is not None)
         values = {n: p.value for n, p in self.parameters.items() if n in study.parameters}
         return study.with_parameters(values)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
+from dataclasses import replace
 
 from ..model.errors import AscentwindWarning, UnknownNameError
 from ..model.wind_statistics import WindStatistics
@@ -83,6 +84,7 @@ def synthesise(
             f"{statistics.altitude.size}; add levels or lower the order"
         )
     result = function(statistics, order, options, **settings)
+    result = replace(result, shaping_filter=replace(result.shaping_filter, origin=statistics.origin))
     if not result.converged:
         warnings.warn(
             StalledFitWarning(

@@ -15,7 +15,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from ..model.errors import DataError
+from ..model.errors import DataError, UnusedOptionError
 
 # '40:100:5' is no emoji, and a folder called '[/red]' no markup
 console = Console(emoji=False, markup=False)
@@ -70,6 +70,24 @@ def parse_changes(texts: Sequence[str]) -> dict[str, Any]:
             raise DataError(f"'{value}' is more than one TOML value; write one --set for each key")
         changes[key.strip()] = read["value"]
     return changes
+
+
+def given(context: typer.Context, name: str) -> bool:
+    """Return whether an option was typed on the command line."""
+    source = context.get_parameter_source(name)
+    return source is not None and source.name == "COMMANDLINE"
+
+
+def refuse_unused(context: typer.Context, names: Sequence[str], why: str) -> None:
+    """Refuse options that were typed but would change nothing.
+
+    Raises
+    ------
+    UnusedOptionError
+    """
+    for parameter in context.command.params:
+        if parameter.name in names and given(context, parameter.name):
+            raise UnusedOptionError(f"{parameter.opts[0]} is not used {why}; leave it out")
 
 
 def progress_bar() -> Progress:

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import brentq
 
+from ..model.errors import DataError
 from ..model.range_reference import interlevel_kernel, shipped_statistics
+from ..model.vehicle import VEHICLE_FILE, Vehicle
 from ..model.wind_filter import ShapingFilter
+from ..model.wind_record import WindRecord
 from ..model.wind_statistics import WindModel, WindStatistics, closed_form_filter
 from .altitude_grid import propagated_covariance
 from .least_squares import FitOptions
@@ -27,20 +30,41 @@ CASES = {
     "annual": ("annual", "1983"),
     "march 2006": ("march", "2006"),
 }
+VEHICLE = "as in the vehicle"
 
 
 @dataclass(frozen=True)
 class WindResponse:
-    """Mean and standard deviation of a response, from wind alone, under one wind."""
+    """Mean and standard deviation of a response, from wind alone, under one wind; ``unit`` of both."""
 
     wind: str
     mean: float
     deviation: float
+    unit: str
+
+
+def recorded_wind(vehicle: Vehicle) -> WindRecord:
+    """Return the record of a vehicle's wind, which says with what it may be compared.
+
+    Raises
+    ------
+    DataError
+        Without one.
+    """
+    record = vehicle.wind.record
+    if record is None:
+        raise DataError(
+            "is missing, so that nobody knows which component the other winds must have; 'ascentwind wind apply "
+            "VEHICLE --component zonal|meridional' writes a wind with its record",
+            file=vehicle.folder / VEHICLE_FILE,
+            column="wind.record",
+        )
+    return record
 
 
 def compare_winds(
     study: Study,
-    winds: Mapping[str, WindModel | ShapingFilter],
+    winds: Mapping[str, WindModel],
     time: float,
     response: str = "bending_moment",
     progress: Callable[[], None] | None = None,
@@ -50,42 +74,47 @@ def compare_winds(
     ``progress`` is called after each wind.
     """
     found = []
-    for name, wind in {"as in the vehicle": None, **winds}.items():
+    for name, wind in {VEHICLE: None, **winds}.items():
         case = study if wind is None else study.with_wind(wind)
         part = case.response_statistics([time], responses=[response]).sel(response=response, source="wind", time=time)
-        found.append(WindResponse(name, float(part["mean"]), float(part["std"])))
+        found.append(WindResponse(name, float(part["mean"]), float(part["std"]), str(part["unit"].item())))
         if progress is not None:
             progress()
     return found
 
 
-def shipped_winds(options: FitOptions | None = None) -> dict[str, WindModel]:
-    """Return the winds of the report's comparison: March, February and annual, and March of the other edition."""
+def shipped_winds(component: str = "zonal", sign: int = 1, options: FitOptions | None = None) -> dict[str, WindModel]:
+    """Return the winds of the report's comparison: March, February and annual, and March of the other edition.
+
+    Parameters
+    ----------
+    component : {'zonal', 'meridional'}
+        Zonal: the closed form of March too, which has no meridional kernel.
+    sign : {1, -1}
+        Of the component along the vehicle's +Y.
+    """
     winds = {}
     for name, (period, edition) in CASES.items():
-        statistics = shipped_statistics(period, edition=edition, top=TOP)
-        winds[f"{name}, fitted"] = WindModel(
-            statistics.mean_table(), synthesise(statistics, options=options).shaping_filter
-        )
-    exact = shipped_statistics(top=TOP, third_order=True)
-    closed = closed_form_filter(interlevel_kernel("march", "zonal", True), exact.standard_deviation_table())
-    winds["march, closed form"] = WindModel(exact.mean_table(), closed)
+        statistics = shipped_statistics(period, component, edition=edition, top=TOP)
+        winds[f"{name}, fitted"] = wind_of(statistics, synthesise(statistics, options=options).shaping_filter, sign)
+    if component == "zonal":
+        exact = shipped_statistics(top=TOP, third_order=True)
+        kernel = interlevel_kernel("march", "zonal", True)
+        closed = closed_form_filter(kernel, exact.standard_deviation_table())
+        winds["march, closed form"] = wind_of(exact, closed, sign)
     return winds
+
+
+def wind_of(statistics: WindStatistics, shaping_filter: ShapingFilter, sign: int = 1) -> WindModel:
+    """Return statistics and a filter fitted to them as one wind; ``sign`` -1 where +Y is west or south."""
+    mean = statistics.mean_table()
+    return WindModel(replace(mean, values=sign * mean.values), shaping_filter, statistics.standard_deviation_table())
 
 
 def stretched(shaping_filter: ShapingFilter, factor: float) -> ShapingFilter:
     """Return a filter that runs faster over altitude by a factor: the same variances, shorter correlations."""
     f = shaping_filter
-    return ShapingFilter(
-        f"{f.name}_stretched",
-        f.altitude,
-        factor * f.F,
-        np.sqrt(factor) * f.G,
-        f.H,
-        f.start_covariance,
-        f.kinks,
-        f.source,
-    )
+    return replace(f, name=f"{f.name}_stretched", F=factor * f.F, G=np.sqrt(factor) * f.G)
 
 
 def stretched_to_error(shaping_filter: ShapingFilter, statistics: WindStatistics, rms: float) -> ShapingFilter:

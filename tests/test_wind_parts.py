@@ -1,6 +1,7 @@
 """Turbulence, two components, flight time, filter files, the vehicle's wind and the command line."""
 
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -123,8 +124,6 @@ def test_two_components_have_the_intralevel_correlation():
 
 
 def _seen(joint, states):
-    from dataclasses import replace
-
     H = np.zeros_like(joint.H)
     H[:, list(states)] = joint.H[:, list(states)]
     return replace(joint, H=H)
@@ -166,8 +165,6 @@ def test_flight_time_gives_the_variance_of_altitude(march):
     end = 80.0
     P = solve_ivp(rate, (0, end), 0.3 * shaping_filter.start_covariance.ravel(), rtol=1e-9, atol=1e-12).y[:, -1]
     H = shaping_filter.at(climb(end)[0])[2]
-    from dataclasses import replace
-
     weaker = replace(shaping_filter, start_covariance=0.3 * shaping_filter.start_covariance)
     in_altitude = propagated_covariance(weaker, np.array([h[0], climb(end)[0]]))[1, 1]
     assert H @ P.reshape(3, 3) @ H == pytest.approx(in_altitude, rel=1e-6)
@@ -225,7 +222,8 @@ def test_fitted_filter_moves_the_bending_variance_by_less_than_one_percent(as504
     """Against the closed form it was fitted to."""
     statistics = shipped_statistics(top=30000.0, third_order=True)
     with pytest.warns(ExtrapolationWarning, match="30000 m"):
-        fitted = as504_closed_form.with_wind(synthesise(statistics).shaping_filter)
+        wind = WindModel(statistics.mean_table(), synthesise(statistics).shaping_filter)
+        fitted = as504_closed_form.with_wind(wind)
     one, other = (
         float(s.response_statistics([75.0]).variance.sel(response="bending_moment", source="wind", time=75.0))
         for s in (as504_closed_form, fitted)
@@ -237,7 +235,7 @@ def test_fitted_filter_moves_the_bending_variance_by_less_than_one_percent(as504
 def test_a_flight_above_the_filter_is_told(as504, march):
     shaping_filter, _ = march
     with pytest.warns(ExtrapolationWarning, match="16000 m"):
-        as504.with_wind(shaping_filter)
+        as504.with_wind(replace(as504.vehicle.wind, shaping_filter=shaping_filter))
 
 
 def test_a_filter_is_held_where_the_mean_wind_goes_on(as504, march):
@@ -246,7 +244,7 @@ def test_a_filter_is_held_where_the_mean_wind_goes_on(as504, march):
     middle = synthesise(statistics.between(2000.0, 16000.0), "constrained-response").shaping_filter
     for f, times in ((shaping_filter, (100.0, 110.0)), (middle, (12.0, 25.0, 100.0))):
         with pytest.warns(ExtrapolationWarning):
-            study = as504.with_wind(f)
+            study = as504.with_wind(replace(as504.vehicle.wind, shaping_filter=f))
         for time in times:
             altitude = study.vehicle.tables["altitude"].polynomial(time)
             F, _, H = f.at(altitude)

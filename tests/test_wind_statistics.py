@@ -206,3 +206,78 @@ def test_real_soundings(tmp_path):
     assert both.intralevel_correlation == pytest.approx([0.135, 0.169, 0.267, 0.277], abs=0.01)
     # day-to-day correlation .48 to .73: the most persistent level decides
     assert 60 < both.zonal.independent_samples < 270
+
+
+CODES = (99.0, -99.0, 99.9, -99.9, 999.0, -999.0, 999.9, -9999.0, 9999.0, -99.99, 32767.0)
+
+
+@pytest.mark.parametrize("code", CODES)
+@pytest.mark.parametrize("share", [0.0004, 0.03])
+def test_missing_value_codes_are_no_wind(tmp_path, code, share):
+    """Profiles with a code are left out or refused: the others' statistics are those of the file without them."""
+    lines = write_profiles(tmp_path / "whole.csv", 2500).read_text().splitlines()
+    spoilt = {f"p{i}" for i in range(0, 2500, round(1 / share))}
+    (tmp_path / "clean.csv").write_text("\n".join(r for r in lines if r.split(",")[0] not in spoilt) + "\n")
+    with_codes = [
+        ",".join([*r.split(",")[:4], f"{code:g}"]) if r.split(",")[0] in spoilt and ",1000," in r else r for r in lines
+    ]
+    file = tmp_path / "codes.csv"
+    file.write_text("\n".join(with_codes) + "\n")
+    with pytest.raises(DataError, match=rf"missing-value codes.*{code:g} m/s at 1000 m \(line 3\)"):
+        read_soundings(file)
+    read = read_soundings(file, drop_incomplete=True)
+    assert read.dropped == len(spoilt)
+    both, wanted = read.statistics("mine"), read_soundings(tmp_path / "clean.csv").statistics("mine")
+    assert both.meridional.standard_deviation == pytest.approx(wanted.meridional.standard_deviation, rel=1e-12)
+    assert both.meridional.standard_deviation == pytest.approx([2, 2, 2], rel=0.1)
+
+
+def jet(file: Path, values) -> Path:
+    random = np.random.default_rng(5)
+    rows = [
+        f"{i},{h},{u:.2f},{random.normal(0, 3):.2f}"
+        for i, x in enumerate(values)
+        for h, u in ((0, np.clip(x / 10, -1, 1)), (9000, x))
+    ]
+    file.write_text("\n".join(["profile,altitude [m],u [m/s],v [m/s]", *rows]) + "\n")
+    return file
+
+
+def test_a_jet_of_99_metres_a_second_is_wind(tmp_path):
+    values = np.random.default_rng(4).normal(70.0, 15.0, 400)
+    values[[3, 50, 77]] = 99.0, 99.9, 115.0
+    read = read_soundings(jet(tmp_path / "jet.csv", values))
+    assert read.dropped == 0
+    assert read.u[:, 1].max() == 115.0
+
+
+@pytest.mark.parametrize(
+    ("row", "value", "says"),
+    [
+        (7, 160.0, r"no wind: 160 m/s at 9000 m \(line 17\)"),
+        (7, -513.93, r"-513.93 m/s at 9000 m"),  # -999 knots
+        (7, 55.0, r"55 m/s at 9000 m \(line 17\)"),
+        (slice(0, 8), 55.0, r"and 3 more; correct them"),
+    ],
+)
+def test_outliers_are_refused_with_their_lines(tmp_path, row, value, says):
+    values = np.random.default_rng(4).normal(0.0, 3.0, 400)
+    values[row] = value
+    with pytest.raises(DataError, match=says):
+        read_soundings(jet(tmp_path / "s.csv", values), drop_incomplete=True)
+
+
+def test_a_level_of_nothing_but_codes_and_altitudes_that_are_none(tmp_path):
+    with pytest.raises(DataError, match="holds 0 complete profiles"):
+        read_soundings(jet(tmp_path / "s.csv", np.full(50, 99.0)), drop_incomplete=True)
+    file = jet(tmp_path / "s.csv", np.random.default_rng(4).normal(0.0, 3.0, 50))
+    for wrong in ("-9999", "99999"):
+        text = file.read_text().replace("7,9000,", f"7,{wrong},", 1)
+        (tmp_path / "t.csv").write_text(text)
+        with pytest.raises(DataError, match=f"{wrong} m is no altitude"):
+            read_soundings(tmp_path / "t.csv", drop_incomplete=True)
+
+
+def test_tops_above_the_tables_are_refused():
+    with pytest.raises(DataError, match="from 3 to 30000 m; 40000 m is not among them"):
+        shipped_statistics(top=40000.0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import shutil
 import tempfile
 from collections.abc import Mapping
@@ -16,15 +17,17 @@ from ...model.construction.construction_file import CONSTRUCTION_FILE, construct
 from ...model.errors import DataError, OutputFolderError
 from ...model.folder_files import file_inside, unsafe_to_copy
 from ...model.plausibility import station_in_name
-from ...model.vehicle import VEHICLE_FILE, load_vehicle
+from ...model.vehicle import VEHICLE_FILE
 from ...model.vehicle_file import TableEntry, VehicleFile, read_vehicle_file
 from ..output import prepare_folder, write_whole
+from ..trial_load import load_trial
 from .mean_flight import EVENT_MARGIN, MeanFlight
 from .tables import Columns, table_text, vehicle_tables
 from .vehicle_numbers import Progress, VehicleNumbers, compute_vehicle
 
 SMALLEST_JUMP = 1e-3  # of a column's largest value, across the two rows beside an event
 POSITION_TOLERANCE = 1e-6  # m
+AZIMUTH_TOLERANCE = 1e-6  # deg
 EVENT_TOLERANCE = 0.5 * EVENT_MARGIN  # beyond, rows beside the event would stand on one side of it
 
 
@@ -78,7 +81,7 @@ def build_vehicle(
             for name, text in texts.items():
                 (made / name).parent.mkdir(parents=True, exist_ok=True)
                 (made / name).write_text(text, encoding="utf-8")
-            _load(made, folder)
+            load_trial(made, folder)
             if out is not None:
                 made.replace(target)
     except OSError as error:
@@ -97,15 +100,6 @@ def inputs_hash(folder: Path) -> str:
     for file in construction_files(folder):
         digest.update(file.read_bytes())
     return digest.hexdigest()[:16]
-
-
-def _load(made: Path, folder: Path) -> None:
-    """Load the vehicle as made; its errors name the files of the folder."""
-    try:
-        load_vehicle(made)
-    except DataError as error:
-        file = None if error.file is None else folder / Path(error.file).relative_to(made)
-        raise DataError(error.why, file=file, column=error.column, row=error.row, time=error.time) from None
 
 
 def check_agreement(toml: Path, file: VehicleFile, construction: Construction) -> None:
@@ -132,6 +126,13 @@ def check_agreement(toml: Path, file: VehicleFile, construction: Construction) -
     for tank in sorted(sloshing ^ named):
         where = "sloshes in " + CONSTRUCTION_FILE if tank in sloshing else "is no sloshing tank of " + CONSTRUCTION_FILE
         refuse(f"'{tank}' {where}; {'add' if tank in sloshing else 'remove'} its [[slosh]]", "slosh")
+    record, azimuth = file.wind.record, math.degrees(construction.site.azimuth)
+    if record is not None and abs(record.azimuth_deg - azimuth) > AZIMUTH_TOLERANCE:
+        refuse(
+            f"is {record.azimuth_deg:g}, but {CONSTRUCTION_FILE} flies towards {azimuth:g} deg; take the wind across "
+            "that path with 'ascentwind wind apply'",
+            "wind.record.azimuth_deg",
+        )
     aft, forward = map(construction.forward_of_gimbal, (construction.aft_end, construction.forward_end))
     for name, sensor in file.control.load_relief.items():
         if not aft - POSITION_TOLERANCE <= sensor.position_m <= forward + POSITION_TOLERANCE:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import tempfile
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -151,7 +151,9 @@ class Model:
     def _in_wind(self, study: Study, values: dict[str, float]) -> Study:
         assert study.vehicle is not None
         if values["wind_correlation"] != 1:
-            study = study.with_wind(stretched(study.vehicle.wind.shaping_filter, values["wind_correlation"]))
+            wind = study.vehicle.wind
+            faster = stretched(wind.shaping_filter, values["wind_correlation"])
+            study = study.with_wind(replace(wind, shaping_filter=faster))
         numbers = {"bending_damping": "bending.", "slosh_damping": "slosh."}
         changes = {
             p: values[name]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import xarray as xr
@@ -45,7 +45,8 @@ def compare(study: Study, progress: Callable[[], None] = lambda: None) -> WindCo
     march = shipped_statistics(top=TOP)
     variances = []
     for rms in REPORT_ERRORS:
-        poorer = study.with_wind(stretched_to_error(winds["march, fitted"].shaping_filter, march, rms))
+        fitted = winds["march, fitted"]
+        poorer = study.with_wind(replace(fitted, shaping_filter=stretched_to_error(fitted.shaping_filter, march, rms)))
         statistics = poorer.response_statistics([TIME], responses=[BENDING])
         variances.append(float(statistics["variance"].sel(source="wind").item()))
         progress()
