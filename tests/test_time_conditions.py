@@ -233,3 +233,13 @@ def test_a_check_that_fails_does_not_cost_the_result(monkeypatch):
         found = study.response_statistics([2.0], check=True)
     np.testing.assert_array_equal(found.std, expected)
     assert np.isinf(found["discretisation_difference"]).all()
+
+
+def test_a_hundred_switches_a_second():
+    """g = 100 fmod(t, 0.01): the verification of compiled code, too, steps over none."""
+    study = Study.from_system(driven_by(lambda t: 100 * ca.fmod(t, 0.01), end=3.0))
+    ends = 0.01 * np.arange(301)
+    inside = [quad(lambda t, a=a: np.exp(-2 * (3 - t)) * (t - a) ** 2, a, b)[0] for a, b in pairwise(ends)]
+    for engine in ("sweep", "cvodes"):
+        found = study.response_statistics([3.0], engine=engine).variance.values[0, 0, 0]
+        assert found == pytest.approx(1e4 * sum(inside), rel=1e-5), engine
