@@ -9,10 +9,13 @@ import sys
 from types import FrameType
 
 INTERRUPTED = 130  # exit code of a shell for Ctrl-C
+PATIENCE = 2.0  # s, for what has to be unwound; results are whole or not there, and the rest is swept by the next run
 
 
 class InterruptHandler:
     """What the command does at SIGINT: the first raises KeyboardInterrupt, the second ends the process at once.
+
+    So does an alarm two seconds later: an exception that falls into a C extension at an unlucky moment is lost there.
 
     Attributes
     ----------
@@ -26,6 +29,9 @@ class InterruptHandler:
         if self.heard:
             os._exit(INTERRUPTED)
         self.heard = True
+        if hasattr(signal, "setitimer"):
+            signal.signal(signal.SIGALRM, lambda *_: os._exit(INTERRUPTED))
+            signal.setitimer(signal.ITIMER_REAL, PATIENCE)
         raise KeyboardInterrupt
 
 
