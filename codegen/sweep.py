@@ -14,7 +14,6 @@ from ..model.system import LinearSystem
 from .cache import CompiledLibrary, compiled_library, wrong_numbers
 from .compiled import ExecutableSystem
 from .compiler import Compiler, find_compiler, known_flags
-from .functions import state_scales
 from .interruption import call
 from .sweep_check import AGREEMENT, NominalNumbers, difference_from_interpreter
 from .sweep_source import MOST_STEPS, SweepFunctions, sweep_fingerprint, sweep_functions, sweep_source
@@ -80,7 +79,12 @@ class CompiledSweep:
         return ctypes.CDLL(str(self.shared_library.path))
 
     def run(
-        self, executable: ExecutableSystem, segments: Segments, tolerance: float, transition: bool = False
+        self,
+        executable: ExecutableSystem,
+        segments: Segments,
+        tolerance: float,
+        sizes: NDArray[np.float64],
+        transition: bool = False,
     ) -> SegmentResults:
         """Sweep over the segments.
 
@@ -91,6 +95,8 @@ class CompiledSweep:
         segments : Segments
         tolerance : float
             Of one step, relative to the size of the states.
+        sizes : (n + responses,) array
+            Typical sizes of states and responses.
         transition : bool
             Keep the transition matrices.
 
@@ -119,14 +125,18 @@ class CompiledSweep:
         counters, failure = np.zeros(3), np.zeros(2)
         code = call(
             self._handle.sweep,
-            *self._arguments(executable, segments, tolerance),
+            *self._arguments(executable, segments, tolerance, sizes),
             *map(_pointer, (state, np.zeros(n), covariance, mean, error, kept, counters, failure)),
         )
         self._check(code, failure, executable, tolerance)
         return SegmentResults(covariance, mean, error, kept, _named(counters))
 
     def mean_history(
+<<<<<<< HEAD
         self, executable: ExecutableSystem | NominalNumbers, segments: Segments, tolerance: float
+=======
+        self, executable: ExecutableSystem, segments: Segments, tolerance: float, sizes: NDArray[np.float64]
+>>>>>>> 284bff2 (Sizes are found from the system: absolute tolerances of CVODES and the covariance equation, first weights of the sweep; short segments; growth beyond numbers ends early)
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], dict[str, int]]:
         """Return states (k + 1, n) and outputs (k + 1, responses) of the mean at the start and all segment ends.
 
@@ -141,14 +151,18 @@ class CompiledSweep:
         counters, failure = np.zeros(3), np.zeros(2)
         code = call(
             self._handle.mean_history,
-            *self._arguments(executable, segments, tolerance),
+            *self._arguments(executable, segments, tolerance, sizes),
             *map(_pointer, (states, outputs, counters, failure)),
         )
         self._check(code, failure, executable, tolerance)
         return states, outputs, _named(counters)
 
     def _arguments(
+<<<<<<< HEAD
         self, executable: ExecutableSystem | NominalNumbers, segments: Segments, tolerance: float
+=======
+        self, executable: ExecutableSystem, segments: Segments, tolerance: float, sizes: NDArray[np.float64]
+>>>>>>> 284bff2 (Sizes are found from the system: absolute tolerances of CVODES and the covariance equation, first weights of the sweep; short segments; growth beyond numbers ends early)
     ) -> list[object]:
         arrays = (segments.end, segments.low, segments.high, executable.parameters, executable.tables)
         return [
@@ -156,7 +170,7 @@ class CompiledSweep:
             ctypes.c_double(segments.start),
             *map(_pointer, arrays),
             ctypes.c_double(tolerance),
-            _pointer(np.concatenate([state_scales(self.system), [o.scale for o in self.system.outputs]])),
+            _pointer(np.ascontiguousarray(sizes, float)),
         ]
 
     def _check(

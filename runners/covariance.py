@@ -19,7 +19,9 @@ from ..codegen.functions import state_scales
 from ..model.errors import IntegrationError
 from .step_budget import at_most, check_explicit_steps
 from .time_nodes import interval_before, intervals, time_nodes
+from .typical_sizes import typical_sizes
 
+LARGEST = 1e280  # of scaled covariances and means
 MOST_STEPS = 100_000  # AS-504 takes 32,000 steps of DOP853 at a tolerance of 1e-13
 
 
@@ -31,11 +33,16 @@ class CovarianceOptions:
     ----------
     relative_tolerance : float
         Of every covariance, between 1e-13 and 1e-2.
+    absolute_part : float
+        The absolute tolerance as a part of the relative one, of the sizes that each source gives the states
+        (runners/typical_sizes.py): one that hardly moves the vehicle gives covariances many orders smaller than the
+        wind's.
     longest_interval : float
         Intervals between discontinuities are divided so that none is longer, s.
     """
 
     relative_tolerance: float = 1e-9
+    absolute_part: float = 1e-4
     longest_interval: float = float("inf")
 
     def __post_init__(self):
@@ -43,6 +50,8 @@ class CovarianceOptions:
             raise IntegrationError(
                 f"a relative tolerance of {self.relative_tolerance:g} cannot be met; choose 1e-13 to 1e-2"
             )
+        if not 0 < self.absolute_part <= 1:
+            raise IntegrationError(f"an absolute part of {self.absolute_part:g} makes no sense; choose up to 1")
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +74,7 @@ def covariance_equation(
     relative_tolerance: float = 1e-9,
     progress: Callable[[float], None] | None = None,
     longest_interval: float = float("inf"),
+    absolute_part: float = 1e-4,
 ) -> CovarianceResult:
     """Integrate covariances of all sources and the mean with SciPy's DOP853.
 
@@ -74,9 +84,8 @@ def covariance_equation(
         With its tables of the mean response filled in.
     times : sequence of float
         Increasing, s.
-    relative_tolerance : float
-        The absolute one is a ten-millionth of it, of scaled states: a source that hardly moves the vehicle has
-        covariances many orders smaller than the wind's.
+    relative_tolerance, absolute_part : float
+        As of :class:`CovarianceOptions`.
     progress : callable, optional
         Called with each time when it is reached.
     longest_interval : float
@@ -96,6 +105,7 @@ def covariance_equation(
         system.start_covariance_matrix(source, executable.parameters) / np.outer(scale, scale)
         for source in system.sources
     ]
+    sizes = typical_sizes(executable, float(np.max(times)))
     matrices = MatrixEvaluator(executable, ("A", "B", "E", "inputs"))
     outputs = MatrixEvaluator(executable, ("C", "G", "inputs"))
     y = np.concatenate([np.array(start).ravel(), np.zeros(n)])
@@ -113,11 +123,18 @@ def covariance_equation(
                 mean = A @ y[-n:] + (E @ inputs[:, 0]) / scale
                 return np.concatenate([derivative.ravel(), mean])
 
+            size = sizes and sizes.least(interval.begin, interval.end) / scale
             budgeted = at_most(rate, MOST_STEPS, "t = {:.6g} s")
-            solution = solve_ivp(
-                budgeted, (interval.begin, interval.end), y, method="DOP853",
-                rtol=relative_tolerance, atol=1e-7 * relative_tolerance,
-            )  # fmt: skip
+            absolute = absolute_part * relative_tolerance * _absolute(size, len(sources), n)
+            with np.errstate(over="ignore", invalid="ignore"):  # growth beyond numbers is told below, with its time
+                solution = solve_ivp(
+                    budgeted, (interval.begin, interval.end), y, method="DOP853", rtol=relative_tolerance, atol=absolute
+                )
+            if np.abs(solution.y[:, -1]).max(initial=0.0) > LARGEST:
+                raise IntegrationError(
+                    f"covariances or the mean leave the range of numbers near {solution.t[-1]:g} s; the system grows "
+                    "without bound (see its roots)"
+                )
             if not solution.success or not np.isfinite(solution.y[:, -1]).all():
                 raise IntegrationError(
                     f"the covariance equation stopped between {interval.begin:g} s and {interval.end:g} s: "
@@ -132,3 +149,14 @@ def covariance_equation(
         if progress:
             progress(float(time))
     return CovarianceResult(np.asarray(times, float), np.array(covariances), np.array(means))
+
+
+def _absolute(size: NDArray | None, sources: int, n: int) -> NDArray[np.float64]:
+    """Return what absolute tolerances are parts of, for covariances of all sources and the mean, from sizes of states.
+
+    A state that a source does not move stays exactly zero, whatever is allowed.
+    """
+    if size is None:
+        return np.full(sources * n * n + n, 1e-3)
+    covariance = np.einsum("si,sj->sij", size[:-1], size[:-1]).ravel()
+    return np.maximum(np.concatenate([covariance, size[-1]]), 1e-250)

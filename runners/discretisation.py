@@ -29,6 +29,10 @@ LARGEST_NORM = 1.0  # of an exponent whose series is summed; with TERMS terms it
 TERMS = 15
 MOST_SUBSTEPS = 200_000
 TOGETHER = 512  # substeps computed at once
+NOT_FINITE = (
+    "the state matrix is not finite somewhere on this flight; see what divides by zero there, or which table holds an "
+    "impossible value (see 'ascentwind inspect')"
+)
 POINTS, WEIGHTS = np.polynomial.legendre.leggauss(3)
 
 
@@ -63,6 +67,30 @@ class Discretisation:
         return np.array(found)
 
 
+@dataclass(frozen=True, eq=False)
+class ExactSteps:
+    """Steps from one time to the next, of states divided by scales of their own, and the outputs at their ends.
+
+    Attributes
+    ----------
+    scale : (n,) array
+    transition : (k, n, n) array
+    added : (k, sources, n, n) array
+    forced : (k, n) array
+        What the known inputs add.
+    output : (k, n_y, n) array
+    direct : (k, n_y) array
+        Of the known inputs in the outputs.
+    """
+
+    scale: NDArray[np.float64]
+    transition: NDArray[np.float64]
+    added: NDArray[np.float64]
+    forced: NDArray[np.float64]
+    output: NDArray[np.float64]
+    direct: NDArray[np.float64]
+
+
 def discretise(executable: ExecutableSystem, times: Sequence[float], substep: float) -> Discretisation:
     """Return the exact steps from the start of the system through ``times``.
 
@@ -80,6 +108,19 @@ def discretise(executable: ExecutableSystem, times: Sequence[float], substep: fl
     IntegrationError
         If the system grows beyond the range of numbers.
     """
+    found = exact_steps(executable, times, substep)
+    mean, state = [], np.zeros(found.scale.size)
+    for Phi, b, C, direct in zip(found.transition, found.forced, found.output, found.direct, strict=True):
+        state = Phi @ state + b
+        mean.append(C @ state + direct)
+    start = [executable.system.start_covariance_matrix(s, executable.parameters) for s in executable.system.sources]
+    relative = np.array(start).reshape(-1, *found.transition.shape[1:]) / np.outer(found.scale, found.scale)
+    steps = Steps(symmetric_root(relative), found.transition, symmetric_root(found.added), found.output)
+    return Discretisation(np.asarray(times, float), steps, found.added, np.array(mean))
+
+
+def exact_steps(executable: ExecutableSystem, times: Sequence[float], substep: float) -> ExactSteps:
+    """Return the steps of :func:`discretise`."""
     system, scale = executable.system, _balanced_scales(executable)
     n, s = len(system.states), len(system.sources)
     rates = MatrixEvaluator(executable, ("A", "B", "E", "inputs"))
@@ -98,23 +139,18 @@ def discretise(executable: ExecutableSystem, times: Sequence[float], substep: fl
         for (number, _), part in zip(pieces, substeps, strict=True):
             before = transition[number], added[number], forced[number]
             transition[number], added[number], forced[number] = _compose(before, part)
-    C, mean, state = [], [], np.zeros(n)
-    for time, Phi, Q, b in zip(nodes, transition, added, forced, strict=True):
+    C, direct = [], []
+    for time, Phi, Q in zip(nodes, transition, added, strict=True):
         if not (np.isfinite(Phi).all() and np.isfinite(Q).all()):
             raise IntegrationError(
                 f"the transition before {time:g} s left the range of numbers; the system grows without "
                 "bound there or a table holds an impossible value (see 'ascentwind inspect')"
             )
-        state = Phi @ state + b
         last = interval_before(executable, time)
         y, G, inputs = outputs(time, last.low, last.high)
         C.append(y * scale)
-        mean.append(C[-1] @ state + G @ inputs[:, 0])
-    start = np.zeros((s, n, n))
-    for k, name in enumerate(system.sources):
-        start[k] = system.start_covariance_matrix(name, executable.parameters)
-    steps = Steps(symmetric_root(start / np.outer(scale, scale)), transition, symmetric_root(added), np.array(C))
-    return Discretisation(np.asarray(times, float), steps, added, np.array(mean))
+        direct.append(G @ inputs[:, 0])
+    return ExactSteps(scale, transition, added, forced, np.array(C), np.array(direct))
 
 
 def _balanced_scales(executable: ExecutableSystem) -> NDArray[np.float64]:
@@ -122,6 +158,8 @@ def _balanced_scales(executable: ExecutableSystem) -> NDArray[np.float64]:
     system, scale = executable.system, state_scales(executable.system)
     first = intervals(executable, system.start, min(system.end, system.start + 100.0))[0]
     (A,) = MatrixEvaluator(executable, ("A",))(0.5 * (first.begin + first.end), first.low, first.high)
+    if not np.isfinite(A).all():
+        raise IntegrationError(NOT_FINITE)
     _, (balance, _) = matrix_balance(A * scale / scale[:, None], permute=False, separate=True)
     return scale * balance
 
@@ -180,6 +218,8 @@ def _added_covariance(
     """
     n = B.shape[1]
     norm = np.abs(exponent[:, :n, :n]).sum(axis=1).max()
+    if not np.isfinite(norm):
+        raise IntegrationError(NOT_FINITE)
     doublings = max(0, int(np.ceil(np.log2(max(norm, 1e-12) / LARGEST_NORM))))
     part = exponent / 2**doublings
     Q = np.zeros((B.shape[0], len(columns), n, n))

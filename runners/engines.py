@@ -231,7 +231,9 @@ def _covariance(
     study: Study, times: list[float], responses: list[str], options: CovarianceOptions, progress: Progress | None
 ) -> ResponseStatistics:
     rows = [study.system.output_index(name) for name in responses]
-    found = covariance_equation(study.with_means, times, options.relative_tolerance, progress, options.longest_interval)
+    found = covariance_equation(
+        study.with_means, times, options.relative_tolerance, progress, options.longest_interval, options.absolute_part
+    )
     attributes = provenance(study) | {"engine": "covariance", "relative_tolerance": options.relative_tolerance}
     dataset = statistics_dataset(study, times, responses, found.mean[:, rows], found.variance[:, rows], attributes)
     return _with_covariance(dataset, found.covariance, rows)
@@ -246,6 +248,7 @@ def _ensemble(
     return found
 
 
+<<<<<<< HEAD
 def _finer_sweep(options: SweepOptions, flight: float) -> SweepOptions:
     """Return a tenth of the tolerance, in pieces so short that no step passes over what the first pass missed."""
     return _in_pieces(options, flight, 0.1)
@@ -258,8 +261,17 @@ def _begun_anew(options: Any, flight: float) -> Any:
 
 def _in_pieces(options: Any, flight: float, share: float) -> Any:
     tolerance = max(LEAST_TOLERANCE, share * options.relative_tolerance)
+=======
+def _finer(options: Any, flight: float) -> Any:
+    """Return a tenth of the tolerance, and looks at flight so often that no step passes over what the first missed.
+
+    Absolutely the tolerance is far less, or both runs would miss the same where sizes are misjudged.
+    """
+    tolerance = max(LEAST_TOLERANCE, 0.1 * options.relative_tolerance)
+>>>>>>> 284bff2 (Sizes are found from the system: absolute tolerances of CVODES and the covariance equation, first weights of the sweep; short segments; growth beyond numbers ends early)
     longest = min(options.longest_interval, flight / LOOKS) if flight > 0 else options.longest_interval
-    return replace(options, relative_tolerance=tolerance, longest_interval=longest)
+    finer = replace(options, relative_tolerance=tolerance, longest_interval=longest)
+    return replace(finer, absolute_part=1e-6 * options.absolute_part) if hasattr(options, "absolute_part") else finer
 
 
 def _finer_ensemble(options: EnsembleOptions, flight: float) -> EnsembleOptions:

@@ -32,8 +32,10 @@ class IntegratorOptions:
         functional iteration its step.
     iteration : {'newton', 'functional'}
     relative_tolerance : float
-        On every adjoint and quadrature, between 1e-13 and 1e-2. The absolute tolerance is a thousandth of it, of
-        quantities scaled to be of the order of one.
+        On every adjoint and quadrature, between 1e-13 and 1e-2.
+    absolute_part : float
+        The absolute tolerance as a part of the relative one, of quantities scaled to be of the order of one
+        (runners/typical_sizes.py).
     max_steps : int
         Of one run from end to start; AS-504 takes 20,000 at a tolerance of 1e-9.
     longest_interval : float
@@ -43,6 +45,7 @@ class IntegratorOptions:
     method: Method = "adams"
     iteration: Iteration = "newton"
     relative_tolerance: float = 1e-7
+    absolute_part: float = 1e-3
     max_steps: int = 200_000
     longest_interval: float = float("inf")
 
@@ -55,13 +58,15 @@ class IntegratorOptions:
             raise IntegrationError(
                 f"a relative tolerance of {self.relative_tolerance:g} cannot be met; choose 1e-13 to 1e-2"
             )
+        if not 0 < self.absolute_part <= 1:
+            raise IntegrationError(f"an absolute part of {self.absolute_part:g} makes no sense; choose up to 1")
 
     def casadi_options(self) -> dict[str, Any]:
         return {
             "linear_multistep_method": self.method,
             "nonlinear_solver_iteration": self.iteration,
             "reltol": self.relative_tolerance,
-            "abstol": 1e-3 * self.relative_tolerance,
+            "abstol": self.absolute_part * self.relative_tolerance,
             "max_num_steps": self.max_steps,
             "quad_err_con": True,
             "show_eval_warnings": False,

@@ -21,6 +21,7 @@ from .cores import available_cores
 from .mean_response import MeanResponse, with_mean_tables
 from .step_budget import naming_fastest_root
 from .time_nodes import Interval, intervals, on_flight, time_nodes
+from .typical_sizes import declared_sizes, misjudged, sizes_of_sweep
 
 LONGEST_SEGMENT = 1.0  # s; weights of the error control are renewed and the Gramians stay well scaled
 LEAST_TOLERANCE, LARGEST_TOLERANCE = 1e-12, 1e-2
@@ -196,8 +197,12 @@ def sweep(
     # an end time at the start needs no integration, only a segment to read it in
     last = nodes[-1] if nodes[-1] > system.start else min(system.end, system.start + longest)
     segments = flight_segments(executable, (*np.unique(nodes[nodes < last]).tolist(), float(last)), longest)
+    keep, sizes = weighting_spacing is not None, sizes_of_sweep(executable, float(last))
     with naming_fastest_root(executable):
-        result = engine.run(executable, segments, relative_tolerance, transition=weighting_spacing is not None)
+        result = engine.run(executable, segments, relative_tolerance, sizes, transition=keep)
+        if misjudged(sizes, result.covariance):
+            sizes = sizes_of_sweep(executable, float(last), trust=False)
+            result = engine.run(executable, segments, relative_tolerance, sizes, transition=keep)
     at = np.where(nodes > system.start, np.searchsorted(segments.end, nodes), -1)
     found = result.covariance[at], result.mean[at], result.error[at]
     if at[0] < 0:
@@ -231,7 +236,7 @@ def with_sweep_mean_tables(
         low, high = (np.array([getattr(p, side) for p in pieces])[which] for side in ("low", "high"))
         segments = Segments(float(times[0]), np.ascontiguousarray(times[1:]), low, high)
         with naming_fastest_root(of):
-            states, outputs, _ = engine.mean_history(of, segments, relative_tolerance)
+            states, outputs, _ = engine.mean_history(of, segments, relative_tolerance, declared_sizes(of.system))
         return MeanResponse(times, states, outputs)
 
     return with_mean_tables(executable, mean)

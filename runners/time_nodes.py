@@ -19,6 +19,7 @@ from ..model.system import LinearSystem
 
 FORWARD = 1.0  # s, looked ahead where a system has no end
 SAME = 1e-9  # of the flight to the last end time: times closer than that are the same
+NEAR_START = 1e-6  # of the flight so far, where that is less
 
 
 @dataclass(frozen=True)
@@ -68,8 +69,9 @@ def interval_after(executable: ExecutableSystem, time: float) -> Interval:
 def time_nodes(executable: ExecutableSystem, times: ArrayLike) -> NDArray[np.float64]:
     """Return the times at which flight is cut for end times, one for each of them, in increasing order as they are.
 
-    Within 1e-9 of the flight to the last of them an end time is the switch nearest to it, or else the end time before
-    it; one beyond either end of the flight by so little is that end. Two end times can have the same node.
+    Within 1e-9 of the flight to the last of them an end time is the switch nearest to it; one beyond either end of the
+    flight by so little is that end. Within 1e-9 of the flight to itself it is the end time before it: just after the
+    start, where everything still grows from rest, times as close as that are not the same. Two can have one node.
 
     Parameters
     ----------
@@ -84,12 +86,13 @@ def time_nodes(executable: ExecutableSystem, times: ArrayLike) -> NDArray[np.flo
     nodes: list[float] = []
     for time in ends:
         node = float(time)
-        near = switches[np.abs(switches - time) <= reach] if switches.size else switches
-        if time - system.start <= rounding(time, system.start):
+        flown = time - system.start
+        near = switches[np.abs(switches - time) <= min(reach, NEAR_START * flown)] if switches.size else switches
+        if flown <= rounding(time, system.start):
             node = system.start
         elif near.size:
             node = float(near[np.argmin(np.abs(near - time))])
-        elif nodes and nodes[-1] > system.start and time - nodes[-1] <= reach:
+        elif nodes and time - nodes[-1] <= max(SAME * flown, rounding(time, system.start)):
             node = nodes[-1]
         nodes.append(max(node, nodes[-1]) if nodes else node)
     return np.array(nodes)
