@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import islice, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +33,9 @@ NOT_FINITE = (
     "the state matrix is not finite somewhere on this flight; see what divides by zero there, or which table holds an "
     "impossible value (see 'ascentwind inspect')"
 )
+GAUSS = (0.5 - np.sqrt(3) / 6, 0.5 + np.sqrt(3) / 6)
+MISSED = 1e-4  # of the exponent of a substep, by a straight line through the Gauss points
+NOISE_CHANGE = 0.05  # of the noise matrix within a substep; what is added goes by its square, in the middle
 POINTS, WEIGHTS = np.polynomial.legendre.leggauss(3)
 
 
@@ -101,7 +104,7 @@ def discretise(executable: ExecutableSystem, times: Sequence[float], substep: fl
     times : sequence of float
         Grid points after the start, increasing, s; one on a discontinuity is taken from the left.
     substep : float
-        Largest span over which the matrices are taken as linear in time, s.
+        Largest span over which the matrices are taken as linear in time, s; where they are not, it is halved.
 
     Raises
     ------
@@ -119,8 +122,10 @@ def discretise(executable: ExecutableSystem, times: Sequence[float], substep: fl
     return Discretisation(np.asarray(times, float), steps, found.added, np.array(mean))
 
 
-def exact_steps(executable: ExecutableSystem, times: Sequence[float], substep: float) -> ExactSteps:
-    """Return the steps of :func:`discretise`."""
+def exact_steps(
+    executable: ExecutableSystem, times: Sequence[float], substep: float, graded: bool = True
+) -> ExactSteps:
+    """Return the steps of :func:`discretise`; without ``graded``, substeps of one length, whatever they miss."""
     system, scale = executable.system, _balanced_scales(executable)
     n, s = len(system.states), len(system.sources)
     rates = MatrixEvaluator(executable, ("A", "B", "E", "inputs"))
@@ -132,7 +137,7 @@ def exact_steps(executable: ExecutableSystem, times: Sequence[float], substep: f
         for number, (begin, end) in enumerate(pairwise([system.start, *nodes]))
         for interval in (intervals(executable, begin, end) if end > begin else [])
     ]
-    substeps = _substeps(rates, [interval for _, interval in pieces], scale, columns, substep)
+    substeps = _substeps(rates, [interval for _, interval in pieces], scale, columns, substep, graded)
     transition = np.tile(np.eye(n), (len(times), 1, 1))
     added, forced = np.zeros((len(times), s, n, n)), np.zeros((len(times), n))
     with np.errstate(over="ignore", invalid="ignore"):  # growth beyond numbers is reported below, with its time
@@ -170,6 +175,7 @@ def _substeps(
     scale: NDArray,
     columns: list[list[int]],
     substep: float,
+    graded: bool,
 ) -> Iterator[tuple[NDArray, NDArray, NDArray]]:
     """Yield transition matrix, added covariances and added mean of each piece, which holds no jump."""
     n = scale.size
@@ -179,34 +185,80 @@ def _substeps(
             f"substeps of {substep:g} s make {needed:.3g} over the flight; choose longer ones, "
             f"{MOST_SUBSTEPS:,} at most"
         )
-    counts = [2 ** max(0, int(np.ceil(np.log2((p.end - p.begin) / substep) - 1e-9))) for p in pieces]
-    ends = np.cumsum(counts)
-    together = [np.flatnonzero((ends - 1) // TOGETHER == block) for block in range(sum(counts) // TOGETHER + 1)]
-    for members in together:
-        if not members.size:
-            continue
-        h = np.concatenate([np.full(counts[i], (pieces[i].end - pieces[i].begin) / counts[i]) for i in members])
-        M, B = np.zeros((2, h.size, n + 1, n + 1)), np.zeros((2, h.size, n, sum(map(len, columns))))
-        number = 0
-        for i in members:
-            for k in range(counts[i]):
-                for g, offset in enumerate((0.5 - np.sqrt(3) / 6, 0.5 + np.sqrt(3) / 6)):
-                    t = pieces[i].begin + (k + offset) * h[number]
-                    A, noise, E, inputs = rates(t, pieces[i].low, pieces[i].high)
-                    M[g, number, :n, :n] = A * scale / scale[:, None]
-                    M[g, number, :n, n] = E @ inputs[:, 0] / scale
-                    B[g, number] = noise / scale[:, None]
-                number += 1
-        wide = h[:, None, None]
+    leaves = _leaves(rates, pieces, scale, substep, graded)
+    carried: dict[int, tuple[NDArray, ...]] = {}
+    done = 0
+    while batch := list(islice(leaves, TOGETHER)):
+        of = np.array([leaf.piece for leaf in batch])
+        wide = np.array([leaf.span for leaf in batch])[:, None, None]
+        M, B = (np.stack([getattr(leaf, name) for leaf in batch], axis=1) for name in ("M", "B"))
         exponent = 0.5 * wide * (M[0] + M[1]) + np.sqrt(3) / 12 * wide**2 * (M[1] @ M[0] - M[0] @ M[1])
         Phi, Q = _added_covariance(exponent, 0.5 * (B[0] + B[1]) * np.sqrt(wide), columns)
-        begin = 0
-        for i in members:
-            part = tuple(a[begin : begin + counts[i]] for a in (Phi[:, :n, :n], Q, Phi[:, :n, n]))
-            begin += counts[i]
-            while part[0].shape[0] > 1:
-                part = _compose(tuple(a[::2] for a in part), tuple(a[1::2] for a in part))
-            yield part[0][0], part[1][0], part[2][0]
+        for piece in np.unique(of):
+            part = tuple(x[of == piece] for x in (Phi[:, :n, :n], Q, Phi[:, :n, n]))
+            while (count := part[0].shape[0]) > 1:
+                even = count - count % 2
+                pairs = _compose(tuple(x[:even:2] for x in part), tuple(x[1:even:2] for x in part))
+                part = tuple(np.concatenate([x, y[even:]]) for x, y in zip(pairs, part, strict=True))
+            one = tuple(x[0] for x in part)
+            carried[piece] = _compose(carried[piece], one) if piece in carried else one
+        while done < of[-1]:  # the last may go on in the next batch
+            yield carried.pop(done)  # type: ignore[misc]
+            done += 1
+    if done in carried:
+        yield carried.pop(done)  # type: ignore[misc]
+
+
+@dataclass(frozen=True, eq=False)
+class _Leaf:
+    """A substep of a piece: its span, and at its two Gauss points the state matrix with the known inputs, and B."""
+
+    piece: int
+    span: float
+    M: NDArray[np.float64]
+    B: NDArray[np.float64]
+
+
+def _leaves(
+    rates: MatrixEvaluator, pieces: list[Interval], scale: NDArray, substep: float, graded: bool
+) -> Iterator[_Leaf]:
+    """Yield substeps in order of time; ``graded`` halves those over which the matrices are not nearly linear.
+
+    A is looked at in the middle as well: what it is off its mean of the Gauss points, times the span, is the part of
+    the exponent that a straight line misses. The noise matrix is held, so that it may change by a part only.
+    """
+    n = scale.size
+
+    def at(time: float, piece: Interval) -> tuple[NDArray, NDArray]:
+        A, noise, E, inputs = rates(time, piece.low, piece.high)
+        M = np.zeros((n + 1, n + 1))
+        M[:n, :n], M[:n, n] = A * scale / scale[:, None], E @ inputs[:, 0] / scale
+        return M, noise / scale[:, None]
+
+    made = 0
+    for number, piece in enumerate(pieces):
+        count = max(1, int(np.ceil((piece.end - piece.begin) / substep - 1e-9)))
+        edges = np.linspace(piece.begin, piece.end, count + 1)
+        waiting = list(pairwise(edges.tolist()))[::-1]
+        while waiting:
+            begin, end = waiting.pop()
+            span, middle = end - begin, 0.5 * (begin + end)
+            (M0, B0), (M1, B1) = (at(begin + offset * span, piece) for offset in GAUSS)
+            if graded:
+                missed = span * np.abs(at(middle, piece)[0] - 0.5 * (M0 + M1))[:n, :n].sum(axis=1).max(initial=0.0)
+                change = np.abs(B1 - B0).max(initial=0.0) > NOISE_CHANGE * np.abs(B0 + B1).max(initial=0.0)
+                if not np.isfinite(missed):
+                    raise IntegrationError(f"{NOT_FINITE}, near {middle:g} s")
+                if missed > MISSED or change:
+                    made += 1
+                    if made > MOST_SUBSTEPS or span < 1e-12 * (piece.end - piece.begin):
+                        raise IntegrationError(
+                            f"the matrices change too fast near {middle:g} s for exact steps; look for a singularity "
+                            "or a jump that is not declared, or use another engine"
+                        )
+                    waiting += [(middle, end), (begin, middle)]
+                    continue
+            yield _Leaf(number, span, np.stack([M0, M1]), np.stack([B0, B1]))
 
 
 def _added_covariance(

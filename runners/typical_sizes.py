@@ -73,7 +73,7 @@ def typical_sizes(executable: ExecutableSystem, time: float) -> TypicalSizes | N
     times[-1] = time
     try:
         with np.errstate(all="ignore"), warnings.catch_warnings():
-            steps = exact_steps(executable, times.tolist(), span)
+            steps = exact_steps(executable, times.tolist(), span, graded=False)
     except IntegrationError:
         return None
     n, scale = len(system.states), steps.scale

@@ -9,7 +9,7 @@ from ascentwind.codegen.ensemble import EnsembleNeedsCompilerError, compiled_ens
 from ascentwind.model import LinearSystem, define_system
 from ascentwind.model.errors import IntegrationError, UnknownNameError
 from ascentwind.runners import CovarianceOptions, EnsembleOptions, IntegratorOptions, Study
-from ascentwind.runners.discretisation import discretise
+from ascentwind.runners.discretisation import discretise, exact_steps
 from ascentwind.runners.ensemble import EnsembleOptionsError, mean_interval, std_interval
 
 
@@ -213,3 +213,26 @@ def test_check_is_the_error_within_its_order(study, engine):
     error = abs(float(found.std.values[0, 0, 0]) / np.sqrt(lag_variance(3.0)) - 1)
     difference = float(found["discretisation_difference"].values[0, 0, 0])
     assert 0.2 * error < difference < 5 * error
+
+
+@pytest.mark.parametrize("start", [1e-3, 1e-2, 0.1])
+def test_substeps_follow_a_singularity(start):
+    """x' = -2 x / t + n from just after t = 0: the integral of (t / t2)^4."""
+    t, x, n = (ca.SX.sym(s) for s in ("t", "x", "n"))
+    system = define_system(
+        "singular", time=t, states={"x": (x, -2 * x / t + n)}, noises={"n": n}, outputs={"x": x}, start=start
+    )
+    times = np.array([2 * start, 0.5, 3.0])
+    executable, exact = Study.from_system(system, compile=False).executable, (times**5 - start**5) / (5 * times**4)
+    np.testing.assert_allclose(discretise(executable, times.tolist(), 0.05).variance()[:, 0, 0], exact, rtol=2e-3)
+    even = exact_steps(executable, times.tolist(), 0.05, graded=False)
+    assert abs(even.output[0, 0, 0] ** 2 * even.added[0, 0, 0, 0] / exact[0] - 1) > 0.01
+
+
+def test_a_singularity_within_the_flight_is_told():
+    t, x, n = (ca.SX.sym(s) for s in ("t", "x", "n"))
+    system = define_system(
+        "pole", time=t, states={"x": (x, -x / (t - 1.01) ** 2 + n)}, noises={"n": n}, outputs={"x": x}
+    )
+    with pytest.raises(IntegrationError, match=r"near 1\.01.* s"):
+        discretise(Study.from_system(system, compile=False).executable, [2.0], 0.05)

@@ -2311,6 +2311,7 @@ static int sweep_segment(Flight *f, double begin, double end, double tolerance, 
   double x[BLOCKS][STATES * LANES];
   Matrices m;
   Step s;
+  const double least = larger(1e-10 * (end - begin), 1e-15 * (fabs(begin) + fabs(end)));
   double t = end, step = *first; /* the last segment's first step: unit vectors excite what decays fast */
   int i, j, b;
   memset(x, 0, sizeof x);
@@ -2322,7 +2323,7 @@ static int sweep_segment(Flight *f, double begin, double end, double tolerance, 
     double error = 0.0, factor;
     const int many = count->steps + count->rejected >= MOST_STEPS;
     if (*stop) return STOPPED;
-    if (h < 1e-10 * (1.0 + fabs(t)) || many) {
+    if ((pieces > 1.0 && h < least) || many) {
       failure->time = t;
       for (b = 0; b < BLOCKS; ++b)
         for (i = 0; i < STATES * LANES; ++i)
@@ -2351,8 +2352,8 @@ static int sweep_segment(Flight *f, double begin, double end, double tolerance, 
       continue;
     }
     count->steps += 1.0;
-    if (t == end) *first = h * smaller(1.0, factor);
-    if (t == end && pieces == 1.0) *first = h * factor;
+    if (t == end && pieces > 1.0) *first = h * smaller(1.0, factor);
+    else if (t == end) *first = factor < 1.0 ? h * factor : larger(*first, h * factor);
     step = h * factor;
     t = pieces > 1.0 ? t - h : begin;
     memcpy(x, s.next, sizeof x);
@@ -2393,15 +2394,23 @@ static void carry(const Segment *restrict g, const double *restrict P, double (*
   multiply(g->transposed, (const double (*)[COLUMNS])product, inherited);
 }
 
+/* Weigh the errors of the adjoint of state r by typical sizes alone. */
+static void weigh_by_size(const double *size, int r, Weights *w) {
+  int s, j;
+  for (j = 0; j < STATES; ++j) w->column[r / LANES][j * LANES + r % LANES] = size[j] / size[r];
+  for (s = 0; s <= SOURCES; ++s) w->gain[s][r] = 1.0 / size[r];
+}
+
 /* w->column[j][r]: what a unit error of the adjoint of state r in place j means for a response, now or later, relative to
  * its standard deviation: the size of state j times the effect of state r, the largest of sources and responses.
  * Effects now (C) and over the next few segments (C Phi, C Phi Phi, ...; Phi of the last segment stands for the next
  * ones). A hundredth of the weight that would keep every single state accurate is the least. w->gain: the second
- * factor alone, and its least for the mean. What is smaller than SMALLEST of its typical size is not resolved. */
+ * factor alone, last that of the mean, against the largest of the sources and itself. What is smaller than SMALLEST of
+ * its typical size is not resolved. */
 static void weigh(const double *C, const Segment *restrict g, const double *P, const double *covariance,
-                  const double *typical, Weights *w) {
+                  const double *m, const double *mean, const double *typical, Weights *w) {
   static const double unit[RESPONSES] = { 0.0 };
-  double effect[HORIZON * RESPONSES][COLUMNS], column[STATES], y[RESPONSES], size[STATES];
+  double effect[HORIZON * RESPONSES][COLUMNS], column[STATES], y[RESPONSES], size[STATES], all[STATES + RESPONSES];
   int s, b, i, j, r;
   memset(effect, 0, sizeof effect);
   memset(w, 0, sizeof *w);
@@ -2418,15 +2427,22 @@ static void weigh(const double *C, const Segment *restrict g, const double *P, c
       for (r = 0; r < COLUMNS; ++r) sum += effect[i - RESPONSES][r] * g->transposed[j][r];
       effect[i][j] = sum;
     }
-  for (s = 0; s < SOURCES; ++s) {
-    double *factor = w->gain[s], *least = w->gain[SOURCES];
+  for (r = 0; r < STATES; ++r) all[r] = fabs(m[r]);
+  for (i = 0; i < RESPONSES; ++i) all[STATES + i] = fabs(mean[i]);
+  for (s = 0; s <= SOURCES; ++s) {
+    double *factor = w->gain[s], deviation[RESPONSES];
     for (r = 0; r < STATES; ++r) {
-      const double variance = P[(s * STATES + r) * STATES + r];
+      const double variance = s < SOURCES ? P[(s * STATES + r) * STATES + r] : all[r] * all[r];
       size[r] = variance > 0.0 ? sqrt(variance) : 0.0;
-      factor[r] = variance > 0.0 ? 0.01 / larger(size[r], SMALLEST * typical[r]) : 0.0;
+      all[r] = larger(all[r], size[r]);
+      factor[r] = size[r] > 0.0 ? 0.01 / larger(size[r], SMALLEST * typical[r]) : 0.0;
+    }
+    for (i = 0; i < RESPONSES; ++i) {
+      const double variance = s < SOURCES ? covariance[(s * RESPONSES + i) * RESPONSES + i] : all[STATES + i] * all[STATES + i];
+      deviation[i] = variance > 0.0 ? sqrt(variance) : 0.0;
+      all[STATES + i] = larger(all[STATES + i], deviation[i]);
     }
     for (i = 0; i < HORIZON * RESPONSES; ++i) {
-      const double variance = covariance[(s * RESPONSES + i % RESPONSES) * RESPONSES + i % RESPONSES];
       const double least = SMALLEST * typical[STATES + i % RESPONSES];
       double now = 0.0, then = 0.0, inverse;
       for (r = 0; r < STATES; ++r) {
@@ -2434,15 +2450,34 @@ static void weigh(const double *C, const Segment *restrict g, const double *P, c
         then = larger(then, fabs(effect[i][r]) * size[r]);
       }
       /* where a system grows, so does the response that errors are held against */
-      inverse = variance > 0.0 ? 1.0 / larger(sqrt(variance), least) : 0.0;
+      inverse = deviation[i % RESPONSES] > 0.0 ? 1.0 / larger(deviation[i % RESPONSES], least) : 0.0;
       if (then > now) inverse *= now / then;
       for (r = 0; r < COLUMNS; ++r) factor[r] = larger(factor[r], fabs(effect[i][r]) * inverse);
     }
-    for (b = 0; b < BLOCKS; ++b)
+    for (b = 0; b < BLOCKS && s < SOURCES; ++b)
       for (j = 0; j < STATES; ++j)
         for (r = 0; r < LANES; ++r)
           w->column[b][j * LANES + r] = larger(w->column[b][j * LANES + r], size[j] * factor[b * LANES + r]);
-    for (r = 0; r < COLUMNS; ++r) least[r] = s && least[r] < factor[r] ? least[r] : factor[r];
+  }
+  /* what no noise reaches is weighed by typical sizes, for the mean */
+  for (r = 0; r < STATES; ++r) {
+    double most = 0.0, felt = 0.0;
+    for (s = 0; s < SOURCES; ++s) most = larger(most, w->gain[s][r]);
+    for (i = 0; i < HORIZON * RESPONSES; ++i) felt = larger(felt, fabs(effect[i][r]));
+    if (most == 0.0 && felt > 0.0) {
+      const double own = w->gain[SOURCES][r];
+      weigh_by_size(typical, r, w);
+      if (own > 0.0) w->gain[SOURCES][r] = own;
+    }
+  }
+}
+
+/* The mean at the end of a segment, from m at its start */
+static void carry_mean(const Segment *restrict g, const double *restrict m, double *restrict next) {
+  int i, j;
+  for (i = 0; i < STATES; ++i) {
+    next[i] = g->z[i];
+    for (j = 0; j < STATES; ++j) next[i] += g->transposed[j][i] * m[j];
   }
 }
 
@@ -2498,33 +2533,34 @@ EXPORT int sweep(int count, double start, const double *end, const double *low, 
   Flight f;
   Counters done = { 0.0, 0.0, 0.0 };
   Failure why = { 0.0, -1.0 };
-  double step = (end[0] - start) / 16.0;
+  double step = 0.0, longest = 0.0;
   int i, j, r, s, k, code = DONE;
   f.p = p;
   f.tables = tables;
   memset(f.piece, 0, sizeof f.piece);
   memset(largest, 0, sizeof largest);
-  memset(&weights, 0, sizeof weights);
-  for (r = 0; r < STATES; ++r) {
-    for (j = 0; j < STATES; ++j) weights.column[r / LANES][j * LANES + r % LANES] = size[j] / size[r];
-    for (s = 0; s <= SOURCES; ++s) weights.gain[s][r] = 1.0 / size[r];
-  }
   for (k = 0; k < count && code == DONE; ++k) {
-    const double begin = k ? end[k - 1] : start;
+    const double begin = k ? end[k - 1] : start, length = end[k] - begin;
+    const int unknown = length > 10.0 * longest; /* the weights know nothing of effects over such a time */
     double *result = covariance + k * SOURCES * RESPONSES * RESPONSES;
     f.low = low[k];
     f.high = high[k];
-    code = sweep_segment(&f, begin, end[k], k ? tolerance : 0.1 * tolerance, &weights, &step, &g, &done, &why, stop);
-    if (code != DONE) break;
     evaluate_output(&f, end[k], C, direct);
-    if (k == 0) {
-      /* The first segment is done twice: once to learn how large states and responses become. It is done finer,
-       * because a flight that starts from rest changes fastest there. */
-      forward(&g, C, P, P_next, result, inherited);
-      weigh(C, &g, P_next, result, size, &weights);
-      code = sweep_segment(&f, begin, end[k], k ? tolerance : 0.1 * tolerance, &weights, &step, &g, &done, &why, stop);
+    if (unknown) {
+      /* The first segment, and one much longer than all before, is done twice: once to learn how large states and
+       * responses become. It is done finer, because a flight that starts from rest changes fastest there. */
+      step = length / 16.0;
+      memset(&weights, 0, sizeof weights);
+      for (r = 0; r < STATES; ++r) weigh_by_size(size, r, &weights);
+      code = sweep_segment(&f, begin, end[k], 0.1 * tolerance, &weights, &step, &g, &done, &why, stop);
       if (code != DONE) break;
+      forward(&g, C, P, P_next, result, inherited);
+      carry_mean(&g, m, next);
+      respond(C, direct, next, mean + k * RESPONSES);
+      weigh(C, &g, P_next, result, next, mean + k * RESPONSES, size, &weights);
     }
+    code = sweep_segment(&f, begin, end[k], unknown ? 0.1 * tolerance : tolerance, &weights, &step, &g, &done, &why, stop);
+    if (code != DONE) break;
     forward(&g, C, P, P_next, result, inherited);
     memcpy(P, P_next, SOURCES * STATES * STATES * sizeof(double));
     for (j = 0; j < STATES; ++j) made = larger(j ? made : 0.0, g.error[j]);
@@ -2542,16 +2578,14 @@ EXPORT int sweep(int count, double start, const double *end, const double *low, 
       }
       largest[s] = worst;
     }
-    for (i = 0; i < STATES; ++i) {
-      next[i] = g.z[i];
-      for (j = 0; j < STATES; ++j) next[i] += g.transposed[j][i] * m[j];
-    }
+    carry_mean(&g, m, next);
     memcpy(m, next, sizeof next);
     respond(C, direct, m, mean + k * RESPONSES);
     if (transition)
       for (i = 0; i < STATES; ++i)
         for (j = 0; j < STATES; ++j) transition[(k * STATES + i) * STATES + j] = g.transposed[j][i];
-    if (SOURCES) weigh(C, &g, P, result, size, &weights);
+    if (length > 0.1 * longest) weigh(C, &g, P, result, m, mean + k * RESPONSES, size, &weights);
+    longest = larger(longest, length);
   }
   counters[0] = done.steps;
   counters[1] = done.rejected;
@@ -2639,7 +2673,7 @@ EXPORT int mean_history(int count, double start, const double *end, const double
       double fine = 0.0, coarse = 0.0, error, factor;
       const int many = counters[0] + counters[1] >= MOST_STEPS;
       if (*stop) return STOPPED;
-      if (h < 1e-10 * (1.0 + fabs(t)) || many) {
+      if (many || (pieces > 1.0 && h < larger(1e-10 * (end[n] - (n ? end[n - 1] : start)), 1e-15 * (fabs(t) + fabs(end[n]))))) {
         failure[0] = t;
         return many ? TOO_MANY_STEPS : TOO_SMALL_A_STEP;
       }
