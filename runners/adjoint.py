@@ -175,8 +175,8 @@ class AdjointSolver:
                 raise StepBudgetError(self._options.max_steps, f"t = {interval.begin:.6g} s", time=interval.begin)
         if growing and np.abs(states).max(initial=0.0) > LARGEST:
             raise IntegrationError(
-                f"the adjoint leaves the range of numbers near {interval.begin:g} s (t2 = {time:g} s); the system grows "
-                "without bound (see its roots)"
+                f"the adjoint leaves the range of numbers near {interval.begin:g} s (t2 = {time:g} s); the system "
+                "grows without bound (see its roots)"
             )
         return states, integrals[:, -1].reshape(len(system.outputs), len(system.sources) + 1)
 

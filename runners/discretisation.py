@@ -237,7 +237,7 @@ def _leaves(
 
     made = 0
     for number, piece in enumerate(pieces):
-        count = max(1, int(np.ceil((piece.end - piece.begin) / substep - 1e-9)))
+        count = 2 ** max(0, int(np.ceil(np.log2((piece.end - piece.begin) / substep) - 1e-9)))
         edges = np.linspace(piece.begin, piece.end, count + 1)
         waiting = list(pairwise(edges.tolist()))[::-1]
         while waiting:
