@@ -101,6 +101,11 @@ def state_scales(system: LinearSystem) -> np.ndarray:
     return np.array([s.scale for s in system.states])
 
 
+def declared_sizes(system: LinearSystem) -> np.ndarray:
+    """Return the typical sizes of states, then responses, shape (n + n_y,)."""
+    return np.concatenate([state_scales(system), [output.scale for output in system.outputs]])
+
+
 def _adjoint(system: LinearSystem) -> tuple[ca.SX, ca.SX, ca.SX]:
     """Return scaled adjoints (a column a response, stacked), their rate and the quadrature integrands."""
     n, r = len(system.states), len(system.outputs)

@@ -14,6 +14,7 @@ from ..model.system import LinearSystem
 from .cache import CompiledLibrary, compiled_library, wrong_numbers
 from .compiled import ExecutableSystem
 from .compiler import Compiler, find_compiler, known_flags
+from .functions import declared_sizes
 from .interruption import call
 from .sweep_check import AGREEMENT, NominalNumbers, difference_from_interpreter
 from .sweep_source import MOST_STEPS, SweepFunctions, sweep_fingerprint, sweep_functions, sweep_source
@@ -83,7 +84,7 @@ class CompiledSweep:
         executable: ExecutableSystem,
         segments: Segments,
         tolerance: float,
-        sizes: NDArray[np.float64],
+        sizes: NDArray[np.float64] | None = None,
         transition: bool = False,
     ) -> SegmentResults:
         """Sweep over the segments.
@@ -96,7 +97,7 @@ class CompiledSweep:
         tolerance : float
             Of one step, relative to the size of the states.
         sizes : (n + responses,) array
-            Typical sizes of states and responses.
+            Typical sizes of states and responses; those that the system declares without it.
         transition : bool
             Keep the transition matrices.
 
@@ -107,7 +108,7 @@ class CompiledSweep:
         system, n = self.system, len(self.system.states)
         covariances = [system.start_covariance_matrix(name, executable.parameters) for name in system.sources]
         state = np.ascontiguousarray(np.array(covariances).reshape(len(system.sources), n, n))
-        return self.integrate(executable, segments, tolerance, state, transition)
+        return self.integrate(executable, segments, tolerance, state, sizes, transition)
 
     def integrate(
         self,
@@ -115,6 +116,7 @@ class CompiledSweep:
         segments: Segments,
         tolerance: float,
         state: NDArray[np.float64],
+        sizes: NDArray[np.float64] | None = None,
         transition: bool = False,
     ) -> SegmentResults:
         """Sweep from covariances (sources, n, n) of the states, which become those at the end; else as ``run``."""
@@ -132,11 +134,11 @@ class CompiledSweep:
         return SegmentResults(covariance, mean, error, kept, _named(counters))
 
     def mean_history(
-<<<<<<< HEAD
-        self, executable: ExecutableSystem | NominalNumbers, segments: Segments, tolerance: float
-=======
-        self, executable: ExecutableSystem, segments: Segments, tolerance: float, sizes: NDArray[np.float64]
->>>>>>> 284bff2 (Sizes are found from the system: absolute tolerances of CVODES and the covariance equation, first weights of the sweep; short segments; growth beyond numbers ends early)
+        self,
+        executable: ExecutableSystem | NominalNumbers,
+        segments: Segments,
+        tolerance: float,
+        sizes: NDArray[np.float64] | None = None,
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], dict[str, int]]:
         """Return states (k + 1, n) and outputs (k + 1, responses) of the mean at the start and all segment ends.
 
@@ -158,11 +160,11 @@ class CompiledSweep:
         return states, outputs, _named(counters)
 
     def _arguments(
-<<<<<<< HEAD
-        self, executable: ExecutableSystem | NominalNumbers, segments: Segments, tolerance: float
-=======
-        self, executable: ExecutableSystem, segments: Segments, tolerance: float, sizes: NDArray[np.float64]
->>>>>>> 284bff2 (Sizes are found from the system: absolute tolerances of CVODES and the covariance equation, first weights of the sweep; short segments; growth beyond numbers ends early)
+        self,
+        executable: ExecutableSystem | NominalNumbers,
+        segments: Segments,
+        tolerance: float,
+        sizes: NDArray[np.float64] | None = None,
     ) -> list[object]:
         arrays = (segments.end, segments.low, segments.high, executable.parameters, executable.tables)
         return [
@@ -170,7 +172,7 @@ class CompiledSweep:
             ctypes.c_double(segments.start),
             *map(_pointer, arrays),
             ctypes.c_double(tolerance),
-            _pointer(np.ascontiguousarray(sizes, float)),
+            _pointer(declared_sizes(self.system) if sizes is None else np.ascontiguousarray(sizes, float)),
         ]
 
     def _check(

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..model.errors import AscentwindError
 from ..model.system import LinearSystem
 from ..model.tables import TableGroup, run_time_vector, table_values
-from .functions import state_scales
+from .functions import declared_sizes, state_scales
 from .runge_kutta import DOP853
 
 if TYPE_CHECKING:
@@ -82,14 +82,16 @@ def _difference_at(sweep: CompiledSweep, numbers: NominalNumbers, time: float) -
     segments = Segments(time, end, low, end)
     n, s = len(system.states), len(system.sources)
     state = np.zeros((s, n, n))
+    response = C @ m + direct[:, 0]
+    variance = np.einsum("ri,sij,rj->sr", C, P, C)
+    sizes = np.sqrt(np.concatenate([np.einsum("sii->i", P) + m**2, variance.sum(axis=0) + response**2]))
+    sizes = np.where(sizes > 0, sizes, declared_sizes(system))
     try:
-        found = sweep.integrate(numbers, segments, TOLERANCE, state, transition=True)
-        means, outputs, _ = sweep.mean_history(numbers, segments, TOLERANCE)
+        found = sweep.integrate(numbers, segments, TOLERANCE, state, sizes, transition=True)
+        means, outputs, _ = sweep.mean_history(numbers, segments, TOLERANCE, sizes)
     except AscentwindError:
         return np.inf
     assert found.transition is not None
-    response = C @ m + direct[:, 0]
-    variance = np.einsum("ri,sij,rj->sr", C, P, C)
     difference = [
         _apart(found.transition[0] / scale[:, None] * scale, Phi / scale[:, None] * scale - np.eye(n), np.eye(n)),
         *(_apart(a / np.outer(scale, scale), b / np.outer(scale, scale)) for a, b in zip(state, P, strict=True)),

@@ -248,27 +248,21 @@ def _ensemble(
     return found
 
 
-<<<<<<< HEAD
 def _finer_sweep(options: SweepOptions, flight: float) -> SweepOptions:
     """Return a tenth of the tolerance, in pieces so short that no step passes over what the first pass missed."""
     return _in_pieces(options, flight, 0.1)
 
 
 def _begun_anew(options: Any, flight: float) -> Any:
-    """Return options for the same pieces; beginning anew in each has an error of its own, kept below the first's."""
+    """Return options for the same pieces; beginning anew in each has an error of its own, kept below the first's.
+
+    Absolutely the tolerance is far less, or both passes would miss the same where sizes are misjudged.
+    """
     return _in_pieces(options, flight, 1e-3)
 
 
 def _in_pieces(options: Any, flight: float, share: float) -> Any:
     tolerance = max(LEAST_TOLERANCE, share * options.relative_tolerance)
-=======
-def _finer(options: Any, flight: float) -> Any:
-    """Return a tenth of the tolerance, and looks at flight so often that no step passes over what the first missed.
-
-    Absolutely the tolerance is far less, or both runs would miss the same where sizes are misjudged.
-    """
-    tolerance = max(LEAST_TOLERANCE, 0.1 * options.relative_tolerance)
->>>>>>> 284bff2 (Sizes are found from the system: absolute tolerances of CVODES and the covariance equation, first weights of the sweep; short segments; growth beyond numbers ends early)
     longest = min(options.longest_interval, flight / LOOKS) if flight > 0 else options.longest_interval
     finer = replace(options, relative_tolerance=tolerance, longest_interval=longest)
     return replace(finer, absolute_part=1e-6 * options.absolute_part) if hasattr(options, "absolute_part") else finer

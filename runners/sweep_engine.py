@@ -21,7 +21,7 @@ from .cores import available_cores
 from .mean_response import MeanResponse, with_mean_tables
 from .step_budget import naming_fastest_root
 from .time_nodes import Interval, intervals, on_flight, time_nodes
-from .typical_sizes import declared_sizes, misjudged, sizes_of_sweep
+from .typical_sizes import misjudged, sizes_of_sweep
 
 LONGEST_SEGMENT = 1.0  # s; weights of the error control are renewed and the Gramians stay well scaled
 LEAST_TOLERANCE, LARGEST_TOLERANCE = 1e-12, 1e-2
@@ -236,7 +236,7 @@ def with_sweep_mean_tables(
         low, high = (np.array([getattr(p, side) for p in pieces])[which] for side in ("low", "high"))
         segments = Segments(float(times[0]), np.ascontiguousarray(times[1:]), low, high)
         with naming_fastest_root(of):
-            states, outputs, _ = engine.mean_history(of, segments, relative_tolerance, declared_sizes(of.system))
+            states, outputs, _ = engine.mean_history(of, segments, relative_tolerance)
         return MeanResponse(times, states, outputs)
 
     return with_mean_tables(executable, mean)

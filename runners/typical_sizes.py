@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..codegen.compiled import ExecutableSystem
-from ..codegen.functions import state_scales
+from ..codegen.functions import declared_sizes
 from ..model.errors import IntegrationError
-from ..model.system import LinearSystem
 from .discretisation import exact_steps
 from .time_nodes import time_nodes
 
@@ -91,11 +90,6 @@ def typical_sizes(executable: ExecutableSystem, time: float) -> TypicalSizes | N
             outputs.append(np.concatenate([deviation, np.abs(C @ mean + direct)[None]]))
     found = TypicalSizes(times, np.array(states), np.array(outputs))
     return found if np.isfinite(found.states).all() and np.isfinite(found.outputs).all() else None
-
-
-def declared_sizes(system: LinearSystem) -> NDArray[np.float64]:
-    """Return the sizes of states and responses that a system declares, (n + n_y,)."""
-    return np.concatenate([state_scales(system), [output.scale for output in system.outputs]])
 
 
 def sizes_of_sweep(executable: ExecutableSystem, time: float, trust: bool = True) -> NDArray[np.float64]:
