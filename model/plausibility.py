@@ -360,6 +360,20 @@ class _Compared:
 
         for load in self.vehicle.file.loads:
             yield from self._inertia(f"loads.{load.output}")
+            yield from self._moved_line(f"loads.{load.output}")
+
+    def _moved_line(self, table: str) -> Iterator[Contradiction]:
+        """A normal force moved by a metre loads no station by more than its own couple, unless parts of it oppose."""
+        column = "center_of_pressure"
+        if f"{table}.{column}" not in self.vehicle.tables:  # read only where a noise needs it
+            return
+        values = self.at(f"{table}.{column}")
+        force = self.q * self.area * np.abs(self.at("normal_force_slope"))
+        yield from self.beyond(
+            table, column, np.abs(values) / np.maximum(force, 1e-300), (0.0, 2.0), (0.0, 20.0),
+            "is {values:.4g} N/rad, where the whole normal force is {force:.4g} N/rad; look at its unit and rows",
+            self.felt, values=values, force=force,
+        )  # fmt: skip
 
     def _inertia(self, table: str) -> Iterator[Contradiction]:
         """Moments that slosh and bending leave at a station, against their masses times the radius of gyration."""

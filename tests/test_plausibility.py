@@ -105,6 +105,11 @@ REFUSED = {
     "attach point in mm": ("slosh_s1_lox.csv", scaled("attach_point", 1e3), "radii of gyration"),
     "slosh mass above all": ("slosh_s1_lox.csv", scaled("mass", 1e3), "of all tanks together is"),
     "moment in N mm": ("loads_station_10m.csv", scaled("angle_of_attack", 1e3), "the normal force at the radius"),
+    "moved normal force in mN": (
+        "loads_station_10m.csv",
+        scaled("center_of_pressure", 1e3),
+        "where the whole normal force is",
+    ),
     "moment of thrust in N mm": (
         "loads_station_10m.csv",
         scaled("engine_angle", 1e3),
