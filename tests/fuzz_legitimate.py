@@ -1,0 +1,30 @@
+"""Changes that make another vehicle, not a contradiction: where no second statement of the same thing exists."""
+
+from __future__ import annotations
+
+import re
+
+from fuzz_mutations import Mutation
+
+# target, file, place, kinds, reason; patterns that must match whole
+REASONS: tuple[tuple[str, str, str, str, str], ...] = (
+    (".*", ".*", ".*", "type|text", "a digit or a word among others, of the type its place asks for"),
+    ("plan", ".*", ".*", ".*", "a plan is the question asked: its numbers, names and order are its author's"),
+    ("design", ".*", ".*", ".*", "bounds, limits and times of a design are the question asked"),
+    ("system", ".*", ".*", ".*", "a system of one's own is what its author writes; two engines agree on it"),
+    ("vehicle", r".*\.csv", "rows", "missing", "rows are interpolated between, and tables may cover a shorter flight"),
+    ("vehicle", r"bending_.*|.*modes\.csv", "displacement_.*|slope_.*", "sign", "a mode has either sign at a place"),
+    ("vehicle", "loads_station_.*", "bending_.*", "sign", "the moment by a mode has the mode's sign, which is free"),
+    ("construction", ".*", r"\[\[normal_force\]\]", "missing", "a vehicle may have fewer parts of the normal force"),
+)
+
+
+def reason(target: str, mutation: Mutation) -> str | None:
+    """Return why a change is a vehicle that someone may mean; None where it should have been told."""
+    for of_target, file, place, kinds, why in REASONS:
+        found = zip(
+            (of_target, file, place, kinds), (target, mutation.file, mutation.place, mutation.kind), strict=True
+        )
+        if all(re.fullmatch(pattern, text) for pattern, text in found):
+            return why
+    return None
