@@ -13,7 +13,7 @@ import numpy as np
 
 from .coverage import check_schedule, check_wind, loaded_flight
 from .csv_table import CsvTable, read_csv_table
-from .errors import DataError, DataErrorCollector, WindWarning, suggestion
+from .errors import DataError, DataErrorCollector, PlausibilityWarning, WindWarning, suggestion
 from .folder_files import file_inside
 from .load_relief import SCHEDULE_COLUMNS, mode_columns
 from .loads import REACTION_COLUMNS, load_columns
@@ -329,6 +329,7 @@ class _Reader:
         breaks = tuple(sorted(self.events[event] for event in entry.events))
         self.discontinuities.update(breaks)
         x = csv.columns["time"]
+        _warn_of_gap(csv)
         if entry.interpolation == "step":
             self.discontinuities.update(x[1:].tolist())
         for column, unit, sign in columns:
@@ -361,6 +362,21 @@ class _Reader:
                     "later or set interpolation = 'pchip'",
                     time=float(times[int(np.argmin(rate))]),
                 )
+
+
+def _warn_of_gap(csv: CsvTable) -> None:
+    """Warn of rows far apart where the others are close: the values between them are interpolated."""
+    x = csv.columns["time"]
+    steps = np.diff(x)
+    widest, usual = int(np.argmax(steps)), float(np.median(steps))
+    if steps.size >= 10 and steps[widest] > max(10 * usual, 0.05 * (x[-1] - x[0])):
+        warnings.warn(
+            PlausibilityWarning(
+                f"{csv.file}, line {csv.lines[widest + 1]}: no rows between {x[widest]:g} and {x[widest + 1]:g} s, "
+                f"where others are {usual:g} s apart; values there are interpolated. Add the rows if they were lost"
+            ),
+            stacklevel=2,
+        )
 
 
 def _bending_columns(tanks: list[str]):

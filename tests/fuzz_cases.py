@@ -34,6 +34,7 @@ from ascentwind.runners.parameter_study.sampling import member_values
 from fuzz_legitimate import reason
 from fuzz_mutations import KINDS, Mutation, mutate
 from fuzz_systems import mutated_system
+from numpy.typing import NDArray
 
 LONGEST = 5.0  # s of processor time
 TARGETS = {"vehicle": 40, "construction": 15, "filter": 10, "plan": 10, "design": 10, "system": 15}
@@ -102,7 +103,7 @@ def _judge(target: str, mutation: Mutation, changed: float, told: list[str]) -> 
         return "not finite", "statistics that are not numbers, without a word"
     if changed < UNCHANGED:
         return "unchanged", ""
-    if why := reason(target, mutation):
+    if why := reason(target, mutation, changed):
         return "legitimate", why
     return "silent", f"statistics move by {changed:.2g}"
 
@@ -163,7 +164,7 @@ def _difference(name: str, folder: Path) -> float:
             size = {k: np.abs(v).max(axis=0, keepdims=True) for k, v in statistics.items()}
             apart = [np.abs(found[k] - v) / np.where(size[k] > 0, size[k], 1) for k, v in statistics.items()]
             return float(np.max(apart)) if all(np.isfinite(a).all() for a in apart) else np.inf
-    found = _statistics(study, [study.system.start + 0.5 * (study.system.end - study.system.start)])
+    found = _statistics(study, [study.system.start + 0.1 * (study.system.end - study.system.start)])
     return 1.0 if all(np.isfinite(v).all() for v in found.values()) else np.inf
 
 
@@ -204,21 +205,31 @@ def _construction(work: Path, kind: str, random: Random) -> tuple[Mutation, floa
         return _none(kind)
     with _marked(mutation):
         build_vehicle(folder, work / "built", spacing=2.0)
-        same = all(
-            (work / "built" / p.name).read_text().split("\n", 3)[-1] == text
-            for p, text in ((Path(n), t) for n, t in _built().items())
-        )
-        return mutation, 0.0 if same else 1.0
+        return mutation, max(_apart(work / "built" / name, table) for name, table in _built().items())
+
+
+def _apart(file: Path, usual: NDArray[np.float64]) -> float:
+    """Return the largest difference of a table from the usual one, relative to its columns; 1 for another shape."""
+    found = _numbers(file)
+    if found.shape != usual.shape:
+        return 1.0
+    size = np.abs(usual).max(axis=0)
+    return float(np.max(np.abs(found - usual) / np.where(size > 0, size, 1.0)))
+
+
+def _numbers(file: Path) -> NDArray[np.float64]:
+    lines = [line for line in file.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
+    return np.array([[float(cell) for cell in line.split(",")] for line in lines[1:]])
 
 
 @cache
-def _built() -> dict[str, str]:
-    """Return the tables that the shipped construction makes, without their comments."""
+def _built() -> dict[str, NDArray[np.float64]]:
+    """Return the tables that the shipped construction makes."""
     with tempfile.TemporaryDirectory() as work:
         folder = Path(work) / "falcon1"
         shutil.copytree(built_in_vehicles()["falcon1"], folder)
         _, written = build_vehicle(folder, Path(work) / "built", spacing=2.0)
-        return {p.name: p.read_text().split("\n", 3)[-1] for p in written}
+        return {path.name: _numbers(path) for path in written}
 
 
 def _plan(work: Path, kind: str, random: Random) -> tuple[Mutation, float]:

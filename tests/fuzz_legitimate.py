@@ -6,6 +6,8 @@ import re
 
 from fuzz_mutations import Mutation
 
+SMALL = 0.01
+
 # target, file, place, kinds, reason; patterns that must match whole
 REASONS: tuple[tuple[str, str, str, str, str], ...] = (
     (".*", ".*", ".*", "type|text", "a digit or a word among others, of the type its place asks for"),
@@ -15,12 +17,36 @@ REASONS: tuple[tuple[str, str, str, str, str], ...] = (
     ("vehicle", r".*\.csv", "rows", "missing", "rows are interpolated between, and tables may cover a shorter flight"),
     ("vehicle", r"bending_.*|.*modes\.csv", "displacement_.*|slope_.*", "sign", "a mode has either sign at a place"),
     ("vehicle", "loads_station_.*", "bending_.*", "sign", "the moment by a mode has the mode's sign, which is free"),
+    (
+        "vehicle",
+        r"vehicle\.toml",
+        r"control\..*",
+        "unit|sign|shift|swap",
+        "gains are the designer's; unstable roots are told",
+    ),
+    (
+        "vehicle",
+        r"vehicle\.toml",
+        r"(bending|slosh|noise)\..*|.*(damping|sigma|correlation_time_s)",
+        "unit|shift|swap|missing",
+        "dampings and noise levels are assumptions of the vehicle's author",
+    ),
+    ("construction", r".*\.csv", ".*", "shift", "a curve moved by a row is another curve; nothing states it twice"),
+    ("construction", ".*", r"engines\.draws", ".*", "what the draws leave comes from no tank (docs/construction.md)"),
+    ("filter", ".*", "source|name", ".*", "words"),
+    ("vehicle", r"bending_.*|.*modes\.csv", "displacement_.*|slope_.*", "unit|shift|swap", "a shape of its own; modes stand once"),
+    ("vehicle", r"wind_.*\.csv", "mean", "unit|sign|shift", "a calmer or stronger mean, or from the other side, of another site"),
     ("construction", ".*", r"\[\[normal_force\]\]", "missing", "a vehicle may have fewer parts of the normal force"),
 )
 
 
-def reason(target: str, mutation: Mutation) -> str | None:
-    """Return why a change is a vehicle that someone may mean; None where it should have been told."""
+def reason(target: str, mutation: Mutation, changed: float) -> str | None:
+    """Return why a change is a vehicle that someone may mean; None where it should have been told.
+
+    ``changed`` is the relative change of the statistics.
+    """
+    if changed < SMALL:
+        return f"the statistics move by less than {SMALL:.0%}, within what such data are known to"
     for of_target, file, place, kinds, why in REASONS:
         found = zip(
             (of_target, file, place, kinds), (target, mutation.file, mutation.place, mutation.kind), strict=True

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
+import re
 
 import numpy as np
 import pytest
 from ascentwind.model.csv_table import read_csv_table
-from ascentwind.model.errors import DataError, OutputFolderError, SeveralDataErrors
+from ascentwind.model.errors import DataError, OutputFolderError, PlausibilityWarning, SeveralDataErrors
 from ascentwind.model.tables import Table
 from ascentwind.model.vehicle import load_vehicle
 from ascentwind.model.vehicle_file import read_vehicle_file
@@ -206,3 +207,13 @@ def test_a_copy_inside_its_source_is_refused(vehicle_folder):
         with pytest.raises(OutputFolderError, match="lies inside"):
             copy_vehicle(str(vehicle_folder), inside)
     assert sorted(p.name for p in vehicle_folder.iterdir()) == before
+
+
+def test_rows_lost_from_the_middle_are_warned_of(vehicle_folder):
+    file = vehicle_folder / "rigid_body.csv"
+    lines = file.read_text().splitlines()
+    file.write_text("\n".join(line for line in lines if not re.match(r"(6|7)\d,", line)) + "\n")
+    with pytest.warns(
+        PlausibilityWarning, match=r"rigid_body.csv, line \d+: no rows between 59 and 80 s, where others are 1"
+    ):
+        load_vehicle(vehicle_folder)
