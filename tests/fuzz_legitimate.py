@@ -34,8 +34,20 @@ REASONS: tuple[tuple[str, str, str, str, str], ...] = (
     ("construction", r".*\.csv", ".*", "shift", "a curve moved by a row is another curve; nothing states it twice"),
     ("construction", ".*", r"engines\.draws", ".*", "what the draws leave comes from no tank (docs/construction.md)"),
     ("filter", ".*", "source|name", ".*", "words"),
-    ("vehicle", r"bending_.*|.*modes\.csv", "displacement_.*|slope_.*", "unit|shift|swap", "a shape of its own; modes stand once"),
-    ("vehicle", r"wind_.*\.csv", "mean", "unit|sign|shift", "a calmer or stronger mean, or from the other side, of another site"),
+    (
+        "vehicle",
+        r"bending_.*|.*modes\.csv",
+        "displacement_.*|slope_.*",
+        "unit|shift|swap",
+        "a shape of its own; modes stand once",
+    ),
+    (
+        "vehicle",
+        r"wind_.*\.csv",
+        "mean",
+        "unit|sign|shift",
+        "a calmer or stronger mean, or from the other side, of another site",
+    ),
     ("construction", ".*", r"\[\[normal_force\]\]", "missing", "a vehicle may have fewer parts of the normal force"),
 )
 
