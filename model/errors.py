@@ -109,6 +109,10 @@ class SystemDefinitionError(AscentwindError):
     """A linear system of one's own is defined in a way that cannot be used."""
 
 
+class NotPicklableError(AscentwindError, TypeError):
+    """Symbols and compiled code do not travel between processes; the data that they are made from do."""
+
+
 class NonlinearSystemError(SystemDefinitionError):
     """An expression given for a linear system is not linear in its states and inputs."""
 

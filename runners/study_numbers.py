@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..codegen.compiled import ExecutableSystem, executable_system
 from ..model.assemble import assemble
 from ..model.coverage import check_wind, loaded_flight
-from ..model.errors import DataError, ParameterValueError, TimeRangeError, UnknownNameError
+from ..model.errors import DataError, NotPicklableError, ParameterValueError, TimeRangeError, UnknownNameError
 from ..model.shipped import find_vehicle
 from ..model.system import LinearSystem, Parameter
 from ..model.tables import table_values
@@ -43,6 +43,12 @@ class StudyNumbers:
 
     executable: ExecutableSystem
     vehicle: Vehicle | None = None
+
+    def __reduce__(self) -> str:
+        raise NotPicklableError(
+            "a study holds symbols and compiled code, which do not travel between processes; send study.vehicle and "
+            "parameter values and make it there with Study.from_vehicle, or let 'ascentwind study' do so"
+        )
 
     @classmethod
     def load(cls, vehicle: str | Path, *, compile: bool = True, changes: Mapping[str, Any] | None = None) -> Self:

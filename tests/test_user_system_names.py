@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import pickle
 import subprocess
 from dataclasses import replace
 
@@ -15,7 +16,12 @@ from ascentwind.codegen.functions import core_functions
 from ascentwind.codegen.source import c_source
 from ascentwind.codegen.sweep_source import sweep_functions, sweep_source
 from ascentwind.model import LinearSystem, define_system
-from ascentwind.model.errors import NonlinearSystemError, SystemDefinitionError, UnknownNameError
+from ascentwind.model.errors import (
+    NonlinearSystemError,
+    NotPicklableError,
+    SystemDefinitionError,
+    UnknownNameError,
+)
 from ascentwind.model.names import file_name
 from ascentwind.runners import Study
 from hypothesis import given
@@ -303,3 +309,8 @@ def test_loaded_library_is_the_named_one(cache):
     path = study.executable.shared_library.path
     assert path.parent == cache and ".." not in path.name and "above" in path.name
     ctypes.CDLL(str(path))
+
+
+def test_a_study_says_that_it_does_not_travel():
+    with pytest.raises(NotPicklableError, match="send study.vehicle and parameter values"):
+        pickle.dumps(Study.from_system(lag(), compile=False))
