@@ -16,11 +16,12 @@ import time
 from pathlib import Path
 
 import numpy as np
-from ascentwind.codegen.compiled import executable_system
-from ascentwind.codegen.functions import core_functions
-from ascentwind.codegen.source import c_source
+
+from ascentwind.codegen.system.executable import executable_system
+from ascentwind.codegen.system.functions import core_functions
+from ascentwind.codegen.system.source import c_source
 from ascentwind.runners import IntegratorOptions, Study
-from ascentwind.runners.adjoint import AdjointSolver
+from ascentwind.runners.solvers.adjoint import AdjointSolver
 
 END_TIME, ROUNDS = 75.0, 7
 

@@ -8,13 +8,14 @@ from importlib.util import find_spec
 
 import casadi as ca
 import numpy as np
-from ascentwind.codegen.functions import state_scales
-from ascentwind.runners import EnsembleOptions, IntegratorOptions, Study
-from ascentwind.runners.covariance import covariance_equation
-from ascentwind.runners.engines import ENGINES
-from ascentwind.runners.time_nodes import intervals
 from numpy_ensembles import Scheme, ensemble, euler_maruyama, fourth_order
 from scipy.integrate import solve_ivp
+
+from ascentwind.codegen.system.functions import state_scales
+from ascentwind.runners import EnsembleOptions, IntegratorOptions, Study
+from ascentwind.runners.solvers.covariance import covariance_equation
+from ascentwind.runners.solvers.time_nodes import intervals
+from ascentwind.runners.statistics.engines import ENGINES
 
 FLIGHTS = 4  # simulated one by one; 500 take 125 times as long
 ENSEMBLE_STEP = 0.02  # s; the fastest root, near 100 rad/s, allows 0.028 s to a fourth-order formula

@@ -8,9 +8,10 @@ import diffrax
 import jax
 import jax.numpy as jnp
 import numpy as np
-from ascentwind.codegen.evaluation import MatrixEvaluator
+
+from ascentwind.codegen.system.evaluation import MatrixEvaluator
 from ascentwind.runners import Study
-from ascentwind.runners.time_nodes import intervals
+from ascentwind.runners.solvers.time_nodes import intervals
 
 jax.config.update("jax_enable_x64", True)
 SPACING = 0.05  # s; a kink of a table is smeared over this much

@@ -7,12 +7,13 @@ from collections.abc import Callable
 
 import casadi as ca
 import numpy as np
-from ascentwind.codegen.ensemble import compiled_ensemble
-from ascentwind.codegen.sweep import compiled_sweep
+
+from ascentwind.codegen.ensemble.compiled import compiled_ensemble
+from ascentwind.codegen.sweep.compiled import compiled_sweep
 from ascentwind.model import LinearSystem, define_system
 from ascentwind.runners import CovarianceOptions, EnsembleOptions, IntegratorOptions, Study
-from ascentwind.runners.engines import ENGINES
-from ascentwind.runners.sweep_engine import batch, sweep
+from ascentwind.runners.solvers.sweep import batch, sweep
+from ascentwind.runners.statistics.engines import ENGINES
 
 BUDGET = 8.0  # s; what is foreseen to take longer is left out
 SIZES = (10, 20, 40, 80)

@@ -15,10 +15,11 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from ascentwind.codegen.evaluation import MatrixEvaluator
+
+from ascentwind.codegen.system.evaluation import MatrixEvaluator
 from ascentwind.runners import Study
-from ascentwind.runners.covariance import covariance_equation
-from ascentwind.runners.time_nodes import intervals
+from ascentwind.runners.solvers.covariance import covariance_equation
+from ascentwind.runners.solvers.time_nodes import intervals
 
 Formula = Callable[[np.ndarray, np.ndarray, float], tuple[np.ndarray, np.ndarray]]
 

@@ -20,14 +20,15 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 import numpy as np
-from ascentwind.runners import Study
-from ascentwind.runners.covariance import covariance_equation
-from ascentwind.runners.figures import STYLE
 from contenders import Contender, contenders
 from growth import Rows, growth
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter, ScalarFormatter
+
+from ascentwind.runners import Study
+from ascentwind.runners.present.style import STYLE
+from ascentwind.runners.solvers.covariance import covariance_equation
 
 FULL = np.arange(11.0, 141.0)
 SOME = np.array([20.0, 60.0, 100.0, 140.0])

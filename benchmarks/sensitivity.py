@@ -13,6 +13,7 @@ import time
 
 import casadi as ca
 import numpy as np
+
 from ascentwind.model import define_system
 from ascentwind.runners import Study
 

@@ -25,14 +25,15 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import psutil
+
 from ascentwind.runners import Study
-from ascentwind.runners.cores import available_cores
 from ascentwind.runners.parameter_study import run
 from ascentwind.runners.parameter_study.cluster import packed, work
 from ascentwind.runners.parameter_study.compute import chunks
 from ascentwind.runners.parameter_study.plan import read_plan
 from ascentwind.runners.parameter_study.quantities import resolve_quantities
 from ascentwind.runners.parameter_study.sampling import member_values
+from ascentwind.runners.solvers.cores import available_cores
 
 ROOT = Path(__file__).parents[1]
 EXAMPLE = ROOT / "examples" / "as504_dispersion.toml"
@@ -155,7 +156,7 @@ def kills(count: int, folder: Path) -> str:
     out, moments, before, hit = folder / "killed", random.Random(504), {}, 0
     for _ in range(count):
         process = subprocess.Popen(
-            [sys.executable, "-c", "from ascentwind.runners.cli import main; main()", "study", file, "--out", out],
+            [sys.executable, "-c", "from ascentwind.runners.cli.app import main; main()", "study", file, "--out", out],
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
         )

@@ -10,23 +10,25 @@ import numpy as np
 import xarray as xr
 
 from ..model.errors import ParameterValueError
-from .adjoint import AdjointSolver
-from .engines import Progress, batch_dataset, compute_statistics
-from .integration import IntegratorOptions
-from .mean_response import with_mean_tables
-from .second_derivatives import second_derivatives
-from .sensitivity import sensitivity
-from .sensitivity_check import check_sensitivity
-from .sensitivity_family import sensitivities
-from .stability import warn_if_unstable
-from .statistics import COMBINED, ResponseStatistics, weighting_dataset, weighting_family
-from .study_numbers import StudyNumbers
-from .sweep_engine import SweepOptions, batch, sweep, sweep_of
-from .times import end_times
+from ..model.system.linear_system import COMBINED
+from .case.case import Case
+from .case.times import end_times
+from .sensitivity.check import check_sensitivity
+from .sensitivity.many import sensitivities
+from .sensitivity.one import sensitivity
+from .sensitivity.second import second_derivatives
+from .solvers.adjoint import AdjointSolver
+from .solvers.integration import IntegratorOptions
+from .solvers.mean_response import with_mean_tables
+from .solvers.stability import warn_if_unstable
+from .solvers.sweep import SweepOptions, batch, sweep, sweep_of
+from .statistics.engines import Progress, batch_dataset, compute_statistics
+from .statistics.results import ResponseStatistics
+from .statistics.weighting import weighting_dataset, weighting_family
 
 
 @dataclass(frozen=True, eq=False)
-class Study(StudyNumbers):
+class Study(Case):
     """Response statistics of a system by the method of adjoint systems.
 
     Make one with :meth:`load` (vehicles) or :meth:`from_system` (systems of your own).
@@ -85,8 +87,8 @@ class Study(StudyNumbers):
         UnstableSystemWarning
         """
         times = end_times(times)
-        self._check_times(times)
-        wanted = self._responses(responses)
+        self.checked_times(times)
+        wanted = self.checked_responses(responses)
         warn_if_unstable(self.executable, times[-1])
         return compute_statistics(self, times, wanted, engine, options, check, progress)
 
@@ -124,11 +126,11 @@ class Study(StudyNumbers):
         """
         if not parameter_sets:
             raise ParameterValueError("a batch needs at least one set of parameter values")
-        self._require_linear_mean("a batch")
+        self.require_linear_mean("a batch")
         ends = end_times(times)
-        self._check_times(ends)
-        self._responses(None)
-        values = [self._parameter_values(changes) for changes in parameter_sets]
+        self.checked_times(ends)
+        self.checked_responses(None)
+        values = [self.numbers(changes) for changes in parameter_sets]
         if self.executable.shared_library is None and options is None and threads is None:
             by_cvodes = IntegratorOptions()
             members = []
@@ -168,8 +170,8 @@ class Study(StudyNumbers):
             As :meth:`weighting_function`, with a dimension ``time`` in front; zero for t after the end time.
         """
         ends = end_times(times)
-        self._check_times(ends)
-        self._check_spacing(spacing)
+        self.checked_times(ends)
+        self.check_spacing(spacing)
         tolerance = (options or SweepOptions()).relative_tolerance
         found = sweep(
             sweep_of(self.executable),
@@ -200,8 +202,8 @@ class Study(StudyNumbers):
             and integrated it gives the variance. ``input_weighting`` (response, input, t): response to an impulse of
             the wind straight into the vehicle; its delta at t = t2 has the weight ``direct`` (response, input).
         """
-        self._check_times([time])
-        self._check_spacing(spacing)
+        self.checked_times([time])
+        self.check_spacing(spacing)
         history = AdjointSolver(self.with_means, options or IntegratorOptions()).history(float(time), spacing)
         return weighting_dataset(self, float(time), history)
 
@@ -248,7 +250,7 @@ class Study(StudyNumbers):
         UndefinedElasticityWarning
             Parameters that are zero; their ``elasticity_defined`` is 0.
         """
-        self._require_linear_mean("a sensitivity")
+        self.require_linear_mean("a sensitivity")
         return sensitivity(self, response, time, source, quantity, parameters, elasticity)
 
     def sensitivities(
@@ -280,7 +282,7 @@ class Study(StudyNumbers):
         ------
         UnknownNameError, StructuralParameterError, TimeRangeError, DirectNoiseError, ZeroQuantityError
         """
-        self._require_linear_mean("a sensitivity")
+        self.require_linear_mean("a sensitivity")
         return sensitivities(self, responses, times, source, quantity, parameters)
 
     def second_derivatives(
@@ -316,7 +318,7 @@ class Study(StudyNumbers):
             For none or more than ten parameters.
         UnknownNameError, StructuralParameterError, TimeRangeError, DirectNoiseError, ZeroQuantityError
         """
-        self._require_linear_mean("a second derivative")
+        self.require_linear_mean("a second derivative")
         return second_derivatives(self, response, time, parameters, source, quantity)
 
     def check_sensitivity(
@@ -344,5 +346,5 @@ class Study(StudyNumbers):
             Over (item): ``derivative``, ``difference``, its ``uncertainty``, how far they are ``apart`` and whether
             the sensitivity ``agrees`` to 1e-5 and the uncertainty.
         """
-        self._require_linear_mean("a sensitivity")
+        self.require_linear_mean("a sensitivity")
         return check_sensitivity(self, response, time, source, quantity, parameters, rows)

@@ -7,7 +7,8 @@ import shutil
 from pathlib import Path
 
 import pytest
-from ascentwind.model.shipped import built_in_vehicles
+
+from ascentwind.model.vehicle.shipped import built_in_vehicles
 from ascentwind.runners import Study
 
 

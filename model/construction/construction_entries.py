@@ -6,8 +6,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from ..folder_files import FileName
-from ..toml_file import Name, NotNegative, Positive, Section, Whole
+from ..files.folder_files import FileName
+from ..files.toml_file import Name, NotNegative, Positive, Section, Whole
 
 Status = Literal["found", "computed", "assumed", "memory"]
 

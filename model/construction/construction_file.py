@@ -10,10 +10,10 @@ from typing import Any, get_args
 
 import numpy as np
 
-from ..csv_table import CsvTable, Order, read_csv_table
 from ..errors import DataError
-from ..folder_files import file_inside
-from ..toml_file import read_toml
+from ..files.csv_table import CsvTable, Order, read_csv_table
+from ..files.folder_files import file_inside
+from ..files.toml_file import read_toml
 from .consistency import check_sizes
 from .construction import Construction
 from .construction_entries import (

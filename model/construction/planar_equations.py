@@ -21,10 +21,10 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from ..control import transfer_function, transfer_function_symbols
-from ..rigid_body import normal_force_slope
-from ..symbols import ParameterSymbols, TableSymbols
-from ..vehicle_file import TransferFunctionEntry
+from ..equations.control import transfer_function, transfer_function_symbols
+from ..equations.rigid_body import normal_force_slope
+from ..system.symbols import ParameterSymbols, TableSymbols
+from ..vehicle.vehicle_file import TransferFunctionEntry
 
 
 @dataclass(frozen=True, eq=False)

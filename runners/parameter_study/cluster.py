@@ -18,10 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...model.errors import AscentwindError
-from ...model.vehicle import Vehicle
-from ..statistics import data_hash
+from ...model.vehicle.vehicle import Vehicle
+from ..case.provenance import data_hash
+from ..solvers.sweep import sweep_of
 from ..study import Study
-from ..sweep_engine import sweep_of
 from .compute import Chunk, ChunkResult, Task, compute_chunk, empty_result
 
 log = logging.getLogger(__name__)

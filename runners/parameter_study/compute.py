@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...model.errors import AscentwindError
-from ..stability import first_unstable
+from ..solvers.stability import first_unstable
+from ..solvers.sweep import sweep, sweep_of, with_sweep_mean_tables
 from ..study import Study
-from ..sweep_engine import sweep, sweep_of, with_sweep_mean_tables
 from .quantities import Quantity, member_numbers
 
 CHUNK = 10  # members computed and stored together

@@ -8,9 +8,9 @@ from matplotlib import rc_context
 from matplotlib.figure import Figure
 from scipy import stats
 
-from ..figures import COLORS, STYLE, words, wrapped
-from ..larger_side import LABEL, LARGER_SIDE, larger_side
-from ..statistics import COMBINED
+from ...model.system.linear_system import COMBINED
+from ..present.style import COLORS, STYLE, words, wrapped
+from ..statistics.larger_side import LABEL, LARGER_SIDE, larger_side
 from .compute import COMPUTED, FAILED, STATUS, UNSTABLE
 from .measures import PEAK, displayed
 from .run import ParameterStudy

@@ -10,8 +10,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ...model.errors import AscentwindError
-from ..larger_side import LARGER_SIDE, SIGMAS, sign
-from ..sensitivity import UndefinedElasticityWarning
+from ..sensitivity.one import UndefinedElasticityWarning
+from ..statistics.larger_side import LARGER_SIDE, SIGMAS, sign
 from ..study import Study
 from .distributions import covariance, marginal, score_correlation
 from .measures import MEASURES, PEAK

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Generator, Iterable
 from concurrent.futures import as_completed
 
-from ...codegen.interruption import Workers
-from ..cores import available_cores
+from ...codegen.toolchain.interruption import Workers
+from ..solvers.cores import available_cores
 from ..study import Study
 from .compute import Chunk, ChunkResult, Task, compute_chunk
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from ..figures import display
-from ..larger_side import LABEL, LARGER_SIDE, larger_side, side
-from ..statistics import COMBINED
+from ...model.system.linear_system import COMBINED
+from ..present.style import display
+from ..statistics.larger_side import LABEL, LARGER_SIDE, larger_side, side
 from .run import ParameterStudy
 
 PEAK = "peak"

@@ -11,10 +11,10 @@ import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from ...model.errors import DataError, TimeRangeError
-from ...model.folder_files import FileName
-from ...model.toml_file import Section, Whole, read_toml, validated
-from ..sweep_engine import LARGEST_TOLERANCE, LEAST_TOLERANCE
-from ..times import parse_times
+from ...model.files.folder_files import FileName
+from ...model.files.toml_file import Section, Whole, read_toml, validated
+from ..case.times import parse_times
+from ..solvers.sweep import LARGEST_TOLERANCE, LEAST_TOLERANCE
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]

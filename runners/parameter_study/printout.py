@@ -7,9 +7,9 @@ import xarray as xr
 from rich.console import Console
 from rich.table import Table
 
-from ..figures import words
-from ..larger_side import LABEL
-from ..terminal import print_whole
+from ..present.style import words
+from ..present.terminal import print_whole
+from ..statistics.larger_side import LABEL
 from .compute import COMPUTED, FAILED, STATUS, UNSTABLE
 from .measures import LABELS, PEAK, displayed, nominal_side
 from .run import ParameterStudy

@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...codegen.compiled import ExecutableSystem
+from ...codegen.system.executable import ExecutableSystem
 from ...model.errors import DataError, ParameterValueError, suggestion
 from ...model.tables import TableGroup
-from ..sensitivity import STRUCTURAL
+from ..sensitivity.request import STRUCTURAL
 from ..study import Study
 from .plan import ParameterStudyPlan, PlannedQuantity
 
@@ -60,7 +60,7 @@ def resolve_quantities(study: Study, plan: ParameterStudyPlan) -> tuple[Quantity
     ParameterValueError
         The vehicle asks for the nonlinear mean, which members do not have.
     """
-    study._require_linear_mean("a parameter study")
+    study.require_linear_mean("a parameter study")
     taken: dict[str, str] = {}
     found = []
     for i, planned in enumerate(plan.quantities):
@@ -133,7 +133,7 @@ def member_numbers(study: Study, quantities: Sequence[Quantity], row: NDArray[np
             else:
                 factors[target.removeprefix(TABLES)] = _checked_factor(target, value)
     groups = tuple(_scaled(group, factors) for group in study.executable.groups)
-    return study.executable.with_numbers(groups=groups, parameters=study._parameter_values(changes))
+    return study.executable.with_numbers(groups=groups, parameters=study.numbers(changes))
 
 
 def _checked_factor(table: str, factor: float) -> float:

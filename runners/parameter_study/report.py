@@ -11,8 +11,8 @@ import numpy as np
 import xarray as xr
 from rich.console import Console
 
-from ..figures import write_figure
-from ..output import write_bytes
+from ..present.files import write_bytes
+from ..present.style import write_figure
 from .changes import changes
 from .compute import STATUS
 from .figures import band_figure, grid_figure, histogram_figure, tornado_figure

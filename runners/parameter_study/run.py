@@ -13,11 +13,12 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ...model.errors import DataError, OutputFolderError, ParameterValueError, UnknownNameError
-from ..output import write_bytes
-from ..statistics import COMBINED, provenance
+from ...model.system.linear_system import COMBINED
+from ..case.provenance import provenance
+from ..case.times import parse_times
+from ..present.files import write_bytes
+from ..solvers.sweep import SweepOptions
 from ..study import Study
-from ..sweep_engine import SweepOptions
-from ..times import parse_times
 from .cluster import compute_on_cluster
 from .compute import FAILED, STATUS, Chunk, ChunkResult, Task, chunks, compute_chunk
 from .local import compute_locally
@@ -119,13 +120,13 @@ def _task(study: Study, plan: ParameterStudyPlan, quantities: tuple[Quantity, ..
     if text is None:
         raise DataError("is missing; a system of your own has no default times", column="times")
     times = sorted(set(parse_times(text)))
-    study._check_times(times)
+    study.checked_times(times)
     SweepOptions(plan.relative_tolerance)
     known = (*study.system.sources, COMBINED)
     for source in plan.sources or ():
         if source not in known:
             raise UnknownNameError("noise source", source, known)
-    return Task(quantities, tuple(times), tuple(study._responses(plan.responses)), plan.relative_tolerance)
+    return Task(quantities, tuple(times), tuple(study.checked_responses(plan.responses)), plan.relative_tolerance)
 
 
 def _check_size(study: Study, task: Task, members: int) -> None:

@@ -18,10 +18,10 @@ from filelock import FileLock, Timeout
 from numpy.typing import NDArray
 
 from ...model.errors import AscentwindError, OutputFolderError
-from ..output import prepare_folder, write_bytes
-from ..statistics import provenance
+from ..case.provenance import provenance
+from ..present.files import prepare_folder, write_bytes
+from ..solvers.sweep import sweep_of
 from ..study import Study
-from ..sweep_engine import sweep_of
 from .compute import Chunk, ChunkResult, Task
 from .plan import ParameterStudyPlan
 

@@ -12,15 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq, least_squares
 
-from ...model.range_reference import shipped_statistics
-from ...model.shipped import find_vehicle
-from ...model.wind_statistics import WindStatistics
-from ..altitude_grid import propagated_covariance
-from ..covariance_intervals import share_inside
-from ..larger_side import LARGER_SIDE, sign
-from ..statistics import COMBINED
+from ...model.system.linear_system import COMBINED
+from ...model.vehicle.shipped import find_vehicle
+from ...model.wind.range_reference import shipped_statistics
+from ...model.wind.statistics import WindStatistics
+from ..statistics.larger_side import LARGER_SIDE, sign
 from ..study import Study
-from ..wind_comparison import stretched
+from ..views.wind_comparison import stretched
+from ..wind.fitting.altitude_grid import propagated_covariance
+from ..wind.fitting.intervals import share_inside
 from .directional import directional_derivative
 from .predictions import BENDING, ENGINE, TIME, end_times, larger_sides
 from .published import BY_NAME, Published

@@ -7,7 +7,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ...model.errors import DataError
-from ..collocation_grid import tables_at
+from ..solvers.collocation_grid import tables_at
 from ..study import Study
 
 

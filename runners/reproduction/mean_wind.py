@@ -11,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ...model.noise_loads import NOISE_LOADS
-from ...model.range_reference import EDITIONS, MONTHS, range_reference
-from ...model.shipped import find_vehicle
+from ...model.vehicle.noise_loads import NOISE_LOADS
+from ...model.vehicle.shipped import find_vehicle
+from ...model.wind.range_reference import EDITIONS, MONTHS, range_reference
 from ..study import Study
 from .predictions import TIME, Responses, end_times, responses
 from .published import BY_NAME

@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from ...model.errors import DirectNoiseError
-from ...model.shipped import find_vehicle
-from ...model.vehicle import VEHICLE_FILE
-from ...model.vehicle_file import read_vehicle_file
-from ..statistics import COMBINED
+from ...model.system.linear_system import COMBINED
+from ...model.vehicle.reader import VEHICLE_FILE
+from ...model.vehicle.shipped import find_vehicle
+from ...model.vehicle.vehicle_file import read_vehicle_file
 from ..study import Study
 from .predictions import ATTACK, ENGINE, TIME, Responses, end_times, responses
 from .rebuild import rebuilt, third_mode

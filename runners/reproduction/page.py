@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from ...model.noise_loads import NOISE_LOADS
-from ..build.flight_checks import FlightCheck
+from ...model.vehicle.noise_loads import NOISE_LOADS
+from .as506.flight import FlightCheck
 from .calibration import RULE, Calibration, Input
 from .mean_wind import MeanWind
 from .options import Effect

@@ -8,13 +8,14 @@ import numpy as np
 import xarray as xr
 
 from ...model.errors import DataError
-from ...model.range_reference import shipped_statistics
-from ..larger_side import larger_side
-from ..stability import roots
-from ..statistics import COMBINED, ResponseStatistics
+from ...model.system.linear_system import COMBINED
+from ...model.wind.range_reference import shipped_statistics
+from ..case.times import parse_times
+from ..solvers.stability import roots
+from ..statistics.larger_side import larger_side
+from ..statistics.results import ResponseStatistics
 from ..study import Study
-from ..times import parse_times
-from ..wind_verification import verify
+from ..wind.verification import verify
 from .published import PUBLISHED, Published
 
 TIME = 75.0  # s, at which the report compares

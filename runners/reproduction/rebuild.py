@@ -12,10 +12,10 @@ import numpy as np
 
 from ...model.construction import Construction
 from ...model.construction.construction_file import load_construction
-from ...model.vehicle import VEHICLE_FILE
-from ...model.vehicle_file import VehicleFile, read_vehicle_file
-from ..build.tables import table_text, vehicle_tables
-from ..build.vehicle_numbers import VehicleNumbers, compute_vehicle
+from ...model.vehicle.reader import VEHICLE_FILE
+from ...model.vehicle.vehicle_file import VehicleFile, read_vehicle_file
+from ..construct.tables import table_text, vehicle_tables
+from ..construct.vehicle_numbers import VehicleNumbers, compute_vehicle
 
 
 def rebuilt(

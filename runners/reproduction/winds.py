@@ -10,12 +10,12 @@ import xarray as xr
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
-from ...model.range_reference import shipped_statistics
-from ..figures import STYLE, display
-from ..larger_side import SIGMAS, side, sign
-from ..statistics import ResponseStatistics
+from ...model.wind.range_reference import shipped_statistics
+from ..present.style import STYLE, display
+from ..statistics.larger_side import SIGMAS, side, sign
+from ..statistics.results import ResponseStatistics
 from ..study import Study
-from ..wind_comparison import REPORT_ERRORS, TOP, shipped_winds, stretched_to_error
+from ..views.wind_comparison import REPORT_ERRORS, TOP, shipped_winds, stretched_to_error
 from .predictions import BENDING, TIME, end_times, larger_sides
 
 SHOWN = ("february, fitted", "annual, fitted", "march 2006, fitted", "march, closed form")

@@ -1,0 +1,5 @@
+"""``python -m ascentwind``: the command line."""
+
+from .runners.cli.entry import main
+
+main()

@@ -1,0 +1,1 @@
+"""Simulated flights in C: random numbers, exact steps."""

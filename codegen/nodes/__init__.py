@@ -1,0 +1,1 @@
+"""A system's matrices and gradients at many times at once, and the collocation equations that use them."""

@@ -1,0 +1,1 @@
+"""The sweep in C: all end times in one pass."""

@@ -1,0 +1,190 @@
+"""The executable form of a system: compiled where a compiler is found, interpreted elsewhere, the same numbers."""
+
+from __future__ import annotations
+
+import logging
+import warnings
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from ...model.errors import AscentwindWarning
+from ...model.system.linear_system import LinearSystem
+from ...model.system.time_conditions import Stops
+from ...model.tables import TableGroup, run_time_vector, table_values
+from ..toolchain.cache import CacheError, CompiledLibrary, compiled_library, set_aside
+from ..toolchain.compiler import find_compiler
+from .functions import MATRICES, CoreFunctions, SystemFunctions, core_functions, interpreted_functions
+from .source import c_source, source_fingerprint
+
+log = logging.getLogger(__name__)
+
+AGREEMENT = 1e-12  # between compiled and interpreted functions, of the largest entry
+_said_once: set[str] = set()
+
+
+class InterpreterWarning(AscentwindWarning):
+    """Compiled code is not used; results are the same, slower."""
+
+
+@dataclass(frozen=True, eq=False)
+class ExecutableSystem:
+    """A linear system with numbers, ready to be evaluated and integrated.
+
+    Attributes
+    ----------
+    system : LinearSystem
+    core : CoreFunctions
+    shared_library : CompiledLibrary or None
+        None when the interpreter is used.
+    groups : tuple of TableGroup
+        The tables in force; their shapes are the system's.
+    parameters : (n_p,) array
+        Values in the order of ``system.parameters``.
+    may_compile : bool
+        Whether engines that exist as compiled code only may be compiled for it.
+    """
+
+    system: LinearSystem
+    core: CoreFunctions
+    shared_library: CompiledLibrary | None
+    groups: tuple[TableGroup, ...]
+    parameters: NDArray[np.float64]
+    may_compile: bool = True
+
+    @cached_property
+    def tables(self) -> NDArray[np.float64]:
+        """The run-time vector that compiled code reads by address; lives as long as this object."""
+        return run_time_vector(self.groups) if self.groups else np.zeros(1)
+
+    def stops(self, until: float) -> Stops:
+        """Return where integrators stop up to ``until`` (s) for the parameters in force."""
+        return self.system.stops(self.parameters, until)
+
+    @property
+    def engine(self) -> str:
+        return "interpreter" if self.shared_library is None else "compiled"
+
+    @cached_property
+    def functions(self) -> SystemFunctions:
+        if self.shared_library is None:
+            return interpreted_functions(self.system, self.core, self.groups)
+        path = str(self.shared_library.path)
+        return SystemFunctions(*(ca.external(name, path) for name in ("matrices", "adjoint", "mean", "response")))
+
+    @property
+    def address(self) -> float:
+        """Where the tables are, as the number that goes to the functions."""
+        return float(self.tables.ctypes.data)
+
+    def integrator_parameters(self, origin: float, span: float, low: float, high: float) -> NDArray[np.float64]:
+        """Return the parameter vector of an integrand for the flight times from ``origin`` over ``span``."""
+        return np.concatenate([[origin, span, low, high], self.parameters, [self.address]])
+
+    def matrices(self, time: float, low: float, high: float) -> dict[str, NDArray[np.float64]]:
+        """Return A, B, C, D, E, G and the known inputs at a time, tables looked up within [low, high]."""
+        values = self.functions.matrices(time, low, high, self.parameters, self.address)
+        return {name: np.array(value.full()) for name, value in zip(MATRICES, values, strict=True)}
+
+    def input_matrices(
+        self, times: NDArray[np.float64], low: float, high: float
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return B (k, n, n_w) and E (k, n, n_u) at many times."""
+        k, n = times.size, len(self.system.states)
+        fixed = (np.full(k, low), np.full(k, high), np.tile(self.parameters[:, None], k), np.full(k, self.address))
+        found = dict(zip(MATRICES, self.functions.matrices.map(k)(times, *fixed), strict=True))
+        B, E = (found[name].full().reshape(n, k, found[name].shape[1] // k).transpose(1, 0, 2) for name in ("B", "E"))
+        return B, E
+
+    def with_numbers(
+        self, *, groups: tuple[TableGroup, ...] | None = None, parameters: NDArray[np.float64] | None = None
+    ) -> ExecutableSystem:
+        """Return the same code with other tables of the same shape or other parameters."""
+        return replace(
+            self,
+            groups=self.groups if groups is None else groups,
+            parameters=self.parameters if parameters is None else parameters,
+        )
+
+
+def executable_system(system: LinearSystem, compile: bool = True) -> ExecutableSystem:
+    """Generate, compile, load and verify a system; without a compiler, or on request, use the interpreter.
+
+    Raises
+    ------
+    CompilerError
+        If a compiler was found and failed.
+    """
+    core = core_functions(system)
+    nominal = np.array([p.value for p in system.parameters])
+    interpreted = ExecutableSystem(system, core, None, system.tables, nominal, may_compile=compile)
+    compiler = find_compiler() if compile else None
+    if compiler is None:
+        if compile:
+            _say_once("no C compiler was found (CC, cc, gcc, clang): CasADi's interpreter is used, a few times slower")
+        return interpreted
+    try:
+        fingerprint = source_fingerprint(system, core)
+        library = compiled_library(
+            system.name, fingerprint, lambda: c_source(system, core), compiler, dict(system.structure)
+        )
+    except CacheError as error:
+        _say_once(f"compiled code is not used: {error}")
+        return interpreted
+    compiled = replace(interpreted, shared_library=library)
+    difference = difference_from_core(compiled)
+    if not difference <= AGREEMENT:
+        set_aside(library)
+        _say_once(
+            f"the compiled library {library.path} differs from the interpreter by {difference:.1e} and was set "
+            "aside: the interpreter is used"
+        )
+        return interpreted
+    return compiled
+
+
+def difference_from_core(executable: ExecutableSystem, points: int = 2, seed: int = 504) -> float:
+    """Return the largest difference between a system's functions and CasADi's interpreter at random points.
+
+    The interpreter evaluates the core functions on table values looked up by NumPy; a difference is relative to the
+    largest entry of its result.
+    """
+    random = np.random.default_rng(seed)
+    system, core, functions, p = executable.system, executable.core, executable.functions, executable.parameters
+    begin, end = system.start, system.end if np.isfinite(system.end) else system.start + 100.0
+    largest = 0.0
+    for _ in range(points):
+        time = random.uniform(begin, end)
+        v = np.array(list(table_values(executable.groups, time).values()))
+        x, adjoint = random.standard_normal(len(system.states)), random.standard_normal(core.adjoint.size1_in(3))
+        interval = executable.integrator_parameters(time, 1.0, begin, end)
+        at_time = (time, begin, end, p, executable.address)
+        backward, forward = functions.adjoint(0, adjoint, [], interval, []), functions.mean(0, x, [], interval, [])
+        pairs = [
+            *zip(
+                functions.matrices(*at_time),
+                [core.state_matrix(time, v, p), *core.other_matrices(time, v, p)],
+                strict=True,
+            ),
+            (functions.response(*at_time, x), core.response(time, v, p, x)),
+            (backward[0], -core.adjoint(time, v, p, adjoint)),
+            (backward[2], core.adjoint_quadrature(time, v, p, adjoint)),
+            (forward[0], core.mean(time, v, p, x)),
+        ]
+        for ours, reference in pairs:
+            a, b = ca.DM(ours).full(), ca.DM(reference).full()
+            differ = ~((a == b) | (np.isnan(a) & np.isnan(b)))
+            if differ.any():
+                scale = max(1e-300, float(np.abs(b[np.isfinite(b)]).max(initial=0.0)))
+                difference = float(np.abs(a[differ] - b[differ]).max()) / scale
+                largest = difference if not difference <= largest else largest
+    return largest
+
+
+def _say_once(text: str) -> None:
+    if text not in _said_once:
+        _said_once.add(text)
+        warnings.warn(InterpreterWarning(text), stacklevel=3)

@@ -1,0 +1,36 @@
+"""A hash that stands for generated C: of all that the source is written from, quicker to have than the source."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable
+from pathlib import Path
+
+import casadi as ca
+
+from ...model.system.linear_system import LinearSystem
+
+
+def fingerprint(system: LinearSystem, functions: Iterable[ca.Function], files: Iterable[str]) -> str:
+    """Return a hash of arithmetic, names, structure and code generator.
+
+    Parameters
+    ----------
+    system : LinearSystem
+    functions : iterable of Function
+        The arithmetic that is written as C.
+    files : iterable of str
+        Modules and templates of this package that write it.
+    """
+    digest = hashlib.sha256()
+    for function in functions:
+        digest.update(function.serialize().encode())
+    for part in (system.name, system.structure, system.states, system.noises, system.outputs, system.input_names):
+        digest.update(repr(part).encode())
+    for p in system.parameters:
+        digest.update(repr((p.name, p.unit)).encode())
+    for g in system.tables:
+        digest.update(repr((g.name, g.argument, g.names, g.units, g.knots.size)).encode())
+    for file in files:
+        digest.update((Path(__file__).parent / file).read_bytes())
+    return digest.hexdigest()

@@ -1,0 +1,41 @@
+"""Relative deviations of vehicle tables (thrust, centre of pressure) as noise: report 4.1.5 and 4.1.6.
+
+A deviation multiplies every term of the named tables at its mean value; the coefficients are the derivative of the
+equations with respect to a common factor on those tables, taken at the mean angle of attack, engine angle and
+attitude. The report calls the deviations white with a one sigma in percent, which has no finite meaning; here a
+deviation is sigma times a first-order Gauss-Markov process of unit variance,
+
+    n' = -n / tau + sqrt(2 / tau) w,
+
+or, as an option, sigma times white noise of unit intensity.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+
+from ..system.symbols import ParameterSymbols
+from ..vehicle.vehicle_file import NoiseEntry
+
+
+@dataclass(frozen=True)
+class NoiseProcess:
+    """A relative deviation: its states (none or one), their derivative, and the deviation itself."""
+
+    state: ca.SX
+    derivative: ca.SX
+    white: ca.SX
+    deviation: ca.SX
+
+
+def noise_process(name: str, entry: NoiseEntry, parameters: ParameterSymbols) -> NoiseProcess:
+    """Declare the parameters of a noise source and return its process."""
+    sigma = parameters.add(f"{name}.sigma", entry.sigma, "1", f"one sigma of the relative deviation of {name}")
+    white = ca.SX.sym(f"white_{name}")
+    if entry.white:
+        return NoiseProcess(ca.SX(0, 1), ca.SX(0, 1), white, sigma * white)
+    tau = parameters.add(f"{name}.correlation_time", entry.correlation_time_s, "s", f"correlation time of {name}")
+    state = ca.SX.sym(f"deviation_{name}")
+    return NoiseProcess(state, -state / tau + ca.sqrt(2 / tau) * white, white, sigma * state)

@@ -1,0 +1,61 @@
+"""What a deviating force puts into the bending moment itself (docs/equations.md, section 4)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import casadi as ca
+
+from ..system.symbols import TableSymbols
+from ..vehicle.columns import MOVED_LINE, MOVED_MODE, SECOND_MOMENT
+from ..vehicle.noise_loads import CENTER_OF_PRESSURE, COEFFICIENTS
+from ..vehicle.vehicle_file import NoiseLoads
+from .bending import mode_column
+
+
+def moved_modal_force(tables: TableSymbols, reference_area: ca.SX, modes: int, alpha: ca.SX) -> ca.SX:
+    """Return what each metre that the normal force moves forward adds to 4-10, N/m, shape (modes,)."""
+    return tables["dynamic_pressure"] * reference_area * mode_column(tables, modes, MOVED_MODE[0]) * alpha
+
+
+def noise_load(
+    tables: Iterable[str],
+    form: NoiseLoads,
+    coefficients: Mapping[str, Any],
+    flight: Any,
+    reference_area: Any,
+    alpha: Any,
+    beta: Any,
+) -> Any:
+    """Return the moment (N m) for a relative deviation of 1 of all these tables, by symbols or by numbers.
+
+    Parameters
+    ----------
+    tables : iterable of str
+        As ``loading_noises`` gives them.
+    form : str
+    coefficients : mapping
+        Columns of the load's table.
+    flight : mapping
+        Tables of the flight, by name.
+    reference_area, alpha, beta
+        m2, and the mean angles (rad).
+    """
+    angles, moment = {"angle_of_attack": alpha, "engine_angle": beta}, 0.0
+    for table in tables:
+        if table in COEFFICIENTS:
+            coefficient = COEFFICIENTS[table]
+            moment = moment + coefficients[coefficient] * angles[coefficient]
+        else:
+            metre = _load_of_a_metre(form, coefficients, flight, reference_area)
+            moment = moment + metre * flight[CENTER_OF_PRESSURE] * alpha
+    return moment
+
+
+def _load_of_a_metre(form: NoiseLoads, coefficients: Mapping[str, Any], flight: Any, reference_area: Any) -> Any:
+    if form == "moved_line":
+        return coefficients[MOVED_LINE[0]]
+    forward = 1.0 if form == "couple_forward" else 0.0
+    couple = flight["dynamic_pressure"] * reference_area * flight["normal_force_slope"]
+    return couple * (forward - coefficients[SECOND_MOMENT[0]] / flight["moment_of_inertia"])

@@ -1,0 +1,127 @@
+"""Load coefficients along the whole vehicle: a table of stations by times."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import DataError, PlausibilityWarning
+from ..files.csv_table import read_csv_table
+from ..files.folder_files import file_inside
+from ..tables import Table
+from ..vehicle.columns import MOVED_LINE, REACTION_COLUMNS, load_columns, local_load_columns
+from ..vehicle.noise_loads import needed_columns
+from ..vehicle.vehicle import Vehicle
+
+KEY = "loads_along_vehicle"
+SAME_STATION = 1e-6  # m
+DIFFERENT = 1e-3  # of the largest coefficient
+ARGUMENTS = (("time", "s", ""), ("station", "m", ""), ("forward_of_gimbal", "m", ""))
+
+
+@dataclass(frozen=True, eq=False)
+class StationLoads:
+    """Coefficients of the bending moment at stations.
+
+    Attributes
+    ----------
+    station, forward_of_gimbal : (s,) arrays
+        Vehicle station and metres forward of the gimbal plane (m).
+    tables : dict of str to tuple of Table
+        By column of a load's table, one table over time for each station.
+    """
+
+    station: NDArray[np.float64]
+    forward_of_gimbal: NDArray[np.float64]
+    tables: dict[str, tuple[Table, ...]]
+
+    def at(self, times: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+        """Return every column at times, (times, s).
+
+        Raises
+        ------
+        DataError
+            For a time that the table does not cover.
+        """
+        first = next(iter(self.tables.values()))[0].argument
+        for time in times:
+            if not first[0] <= time <= first[-1]:
+                raise DataError(
+                    f"t = {time:g} s lies outside of the loads along the vehicle, {first[0]:g} to {first[-1]:g} s; "
+                    "build the vehicle for it"
+                )
+        return {name: np.array([table.polynomial(times) for table in tables]).T for name, tables in self.tables.items()}
+
+
+def along_columns(modes: int, tanks: list[str]) -> tuple[tuple[str, str, str], ...]:
+    """Return the coefficient columns of the table: name, unit, sign."""
+    return (*load_columns(modes, tanks), *REACTION_COLUMNS, MOVED_LINE, *local_load_columns(modes))
+
+
+def load_station_loads(vehicle: Vehicle) -> StationLoads:
+    """Read the table that a vehicle names as ``tables.loads_along_vehicle``.
+
+    Raises
+    ------
+    DataError
+        If there is none, if a column is missing, or if the stations differ from time to time.
+    """
+    entry = vehicle.file.tables.loads_along_vehicle
+    if entry is None:
+        raise DataError(
+            "is missing, but the bending moment along the vehicle needs it; 'ascentwind build-vehicle' makes it",
+            file=vehicle.folder / "vehicle.toml",
+            column=f"tables.{KEY}",
+        )
+    file: Path = file_inside(vehicle.folder, entry.file)
+    csv = read_csv_table(file, "time", "s", order="not decreasing")
+    columns = along_columns(len(vehicle.bending), [tank.name for tank in vehicle.slosh])
+    if MOVED_LINE not in needed_columns(vehicle.file)[0]:
+        columns = tuple(column for column in columns if column != MOVED_LINE)
+    for name, unit, _ in (*ARGUMENTS, *columns):
+        csv.column(name, unit)
+    time, station = csv.columns["time"], csv.columns["station"]
+    times, stations = np.unique(time), np.unique(station)
+    shape = times.size, stations.size
+    order = np.lexsort((station, time))
+    if order.size != times.size * stations.size or (station[order].reshape(shape) != stations).any():
+        raise DataError(
+            f"has {order.size} rows for {times.size} times and {stations.size} stations; give every station once at "
+            "every time",
+            file=file,
+        )
+    breaks = tuple(sorted(vehicle.file.events[event] for event in entry.events if event in vehicle.file.events))
+
+    def tables(name: str, unit: str) -> tuple[Table, ...]:
+        values = csv.columns[name][order].reshape(shape)
+        return tuple(Table(name, unit, times, row, entry.interpolation, breaks) for row in values.T)
+
+    forward = csv.columns["forward_of_gimbal"][order].reshape(shape)[0]
+    found = StationLoads(stations, forward, {name: tables(name, unit) for name, unit, _ in columns})
+    _compare(vehicle, found, file)
+    return found
+
+
+def _compare(vehicle: Vehicle, along: StationLoads, file: Path) -> None:
+    """Warn where a load's own table and the stations along the vehicle tell of different vehicles."""
+    for load in vehicle.file.loads:
+        k = int(np.argmin(np.abs(along.station - load.station_m)))
+        if abs(along.station[k] - load.station_m) > SAME_STATION:
+            continue
+        for column in ("angle_of_attack", "engine_angle"):
+            own, other = vehicle.tables[f"loads.{load.output}.{column}"], along.tables[column][k]
+            times = other.argument[(other.argument >= own.argument[0]) & (other.argument <= own.argument[-1])]
+            here, there = own.polynomial(times), other.polynomial(times)
+            off = np.abs(here - there)
+            worst = int(np.argmax(off))
+            if off[worst] > DIFFERENT * np.abs(here).max():
+                warnings.warn(
+                    f"{file}, column '{column}', t = {times[worst]:g} s: is {there[worst]:.6g} at station "
+                    f"{load.station_m:g} m, but {load.table.file} has {here[worst]:.6g}; build both again",
+                    PlausibilityWarning,
+                    stacklevel=3,
+                )

@@ -1,0 +1,36 @@
+"""The wind block: a shaping filter over altitude, carried to flight time along the trajectory (Appendix E).
+
+With hdot the rate of climb, z' = hdot F z + sqrt(hdot) G n: white noise of unit intensity in altitude becomes unit
+intensity in time with the gain sqrt(hdot), because delta(h - h') = delta(t - t') / hdot.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+
+from ..system.symbols import TableSymbols
+from ..wind.shaping_filter import ShapingFilter, entry_name
+
+
+@dataclass(frozen=True)
+class WindBlock:
+    """Filter states, their derivative, the white noises and the random part of the wind (m/s)."""
+
+    states: ca.SX
+    derivative: ca.SX
+    white: ca.SX
+    wind: ca.SX
+
+
+def wind_block(shaping_filter: ShapingFilter, tables: TableSymbols, scale: ca.SX) -> WindBlock:
+    """Return the filter in flight time; ``scale`` multiplies its output."""
+    n, m = shaping_filter.order, shaping_filter.noise_count
+    matrices = {"F": ca.SX(n, n), "G": ca.SX(n, m), "H": ca.SX(1, n)}
+    for label, i, j in shaping_filter.entries:
+        matrices[label][i, j] = tables[entry_name(label, i, j)]
+    z, white = ca.SX.sym("wind", n), ca.SX.sym("white_wind", m)
+    rate = tables["altitude_rate"]
+    derivative = rate * (matrices["F"] @ z) + ca.sqrt(rate) * (matrices["G"] @ white)
+    return WindBlock(z, derivative, white, scale * (matrices["H"] @ z))

@@ -1,0 +1,1 @@
+"""Reading CSV and TOML, with errors that name file, column and line."""

@@ -1,0 +1,1 @@
+"""The general linear time-varying system, and its symbols."""

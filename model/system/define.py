@@ -1,0 +1,115 @@
+"""A linear system of one's own, written in a few lines."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+import casadi as ca
+import numpy as np
+
+from .checks import check_keys, finite_number, pair, scalar_expression, scalar_symbol
+from .linear_system import LinearSystem, Noise, Output, Parameter, State
+
+
+def define_system(
+    name: str,
+    *,
+    time: ca.SX,
+    states: Mapping[str, tuple[ca.SX, ca.SX]],
+    noises: Mapping[str, ca.SX],
+    outputs: Mapping[str, ca.SX],
+    parameters: Mapping[str, tuple[ca.SX, float]] | None = None,
+    inputs: Mapping[str, tuple[ca.SX, ca.SX | float]] | None = None,
+    sources: Mapping[str, str] | None = None,
+    units: Mapping[str, str] | None = None,
+    scales: Mapping[str, float] | None = None,
+    start_covariance: Mapping[str, ca.SX | np.ndarray] | None = None,
+    start: float = 0.0,
+    end: float = float("inf"),
+    discontinuities: Sequence[float] = (),
+) -> LinearSystem:
+    """Write a linear system of your own in a few lines.
+
+    Parameters
+    ----------
+    name : str
+    time : SX scalar
+    states : mapping of name to (symbol, derivative)
+    noises : mapping of name to symbol
+        White noises of unit intensity.
+    outputs : mapping of name to expression
+    parameters : mapping of name to (symbol, value), optional
+    inputs : mapping of name to (symbol, value over time), optional
+        Known inputs; they make the mean.
+    sources : mapping of noise name to source, optional
+        Without it every noise is a source of its own.
+    units : mapping by state, output or parameter name, optional
+    scales : mapping by state or output name, optional
+        Typical sizes, by which integrators weigh errors.
+    start_covariance : mapping of source to (n, n) SX or array, optional
+    start, end : float
+        Seconds.
+    discontinuities : sequence of float
+        Times at which the equations jump, s, in any order; conditions on time in the expressions are located without.
+
+    Returns
+    -------
+    LinearSystem
+
+    Raises
+    ------
+    SystemDefinitionError, NonlinearSystemError, TimeRangeError
+        As :class:`LinearSystem`, and symbols or expressions of another kind than casadi.SX.
+    UnknownNameError
+        A name in ``units``, ``scales``, ``sources`` or ``start_covariance`` that nothing carries.
+
+    Examples
+    --------
+    >>> import casadi as ca
+    >>> t, x, n, tau = (ca.SX.sym(s) for s in ("t", "x", "n", "tau"))
+    >>> lag = define_system("lag", time=t, states={"x": (x, -x / tau + n)}, noises={"gust": n},
+    ...                     outputs={"x": x}, parameters={"tau": (tau, 2.0)})
+    >>> lag.sources
+    ('gust',)
+    """
+    units, scales, sources = units or {}, scales or {}, sources or {}
+    parameters, inputs = parameters or {}, inputs or {}
+    check_keys("state, output or parameter", units, (*states, *outputs, *parameters))
+    check_keys("state or output", scales, (*states, *outputs))
+    check_keys("noise", sources, noises)
+    equations = {n: pair("state", n, value, "(symbol, derivative)") for n, value in states.items()}
+    known = {n: pair("input", n, value, "(symbol, value over time)") for n, value in inputs.items()}
+    numbers = {n: pair("parameter", n, value, "(symbol, number)") for n, value in parameters.items()}
+
+    def column(entries: Iterable[ca.SX]) -> ca.SX:
+        return ca.vertcat(ca.SX(0, 1), *entries)
+
+    return LinearSystem(
+        name=name,
+        time=scalar_symbol("time", "t", time),
+        x=column(scalar_symbol("state", n, s) for n, (s, _) in equations.items()),
+        w=column(scalar_symbol("noise", n, s) for n, s in noises.items()),
+        u=column(scalar_symbol("input", n, s) for n, (s, _) in known.items()),
+        p=column(scalar_symbol("parameter", n, s) for n, (s, _) in numbers.items()),
+        v=ca.SX(0, 1),
+        derivative=column(scalar_expression("the derivative of state", n, d) for n, (_, d) in equations.items()),
+        output=column(scalar_expression("output", n, e) for n, e in outputs.items()),
+        states=tuple(State(n, units.get(n, "1"), scales.get(n, 1.0)) for n in states),
+        noises=tuple(Noise(n, sources.get(n, n)) for n in noises),
+        outputs=tuple(Output(n, units.get(n, "1"), scales.get(n, 1.0)) for n in outputs),
+        parameters=tuple(
+            Parameter(n, finite_number("parameter", n, value), units.get(n, "1")) for n, (_, value) in numbers.items()
+        ),
+        input_names=tuple(inputs),
+        input_values=column(scalar_expression("the value of input", n, value) for n, (_, value) in known.items()),
+        start_covariance=start_covariance or {},
+        discontinuities=tuple(discontinuities),
+        start=start,
+        end=end,
+        structure={
+            "states": ", ".join(map(str, states)),
+            "noises": ", ".join(map(str, noises)),
+            "outputs": ", ".join(map(str, outputs)),
+            "inputs": ", ".join(map(str, inputs)) or "none",
+        },
+    )

@@ -1,0 +1,325 @@
+"""The general linear time-varying system that every vehicle, wind filter and user's own model becomes.
+
+    x' = A(t, p) x + B(t, p) w + E(t, p) u        w: white noise of unit intensity, grouped by source
+    y  = C(t, p) x + D(t, p) w + G(t, p) u        u: known inputs, such as the mean wind
+
+The equations stand once, as CasADi expressions linear in x, w and u; the matrices are their derivatives.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
+
+import casadi as ca
+import numpy as np
+
+from ..errors import DirectNoiseError, NonlinearSystemError, SystemDefinitionError, TimeRangeError, UnknownNameError
+from ..tables import TableGroup
+from .checks import (
+    check_covariance,
+    check_keys,
+    check_labels,
+    check_symbols,
+    checked_covariance,
+)
+from .switches import switch_times
+from .time_conditions import Condition, Stops, find_conditions, locate
+
+
+@dataclass(frozen=True)
+class State:
+    """A state: its name, unit, and a typical size that the integrators use to weigh errors."""
+
+    name: str
+    unit: str = "1"
+    scale: float = 1.0
+
+
+@dataclass(frozen=True)
+class Noise:
+    """A white-noise input of unit intensity and the source (wind, thrust, ...) that it belongs to."""
+
+    name: str
+    source: str
+
+
+@dataclass(frozen=True)
+class Output:
+    """A response: its name, unit, typical size and, where it has one, the report's symbol."""
+
+    name: str
+    unit: str = "1"
+    scale: float = 1.0
+    symbol: str = ""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number that can be changed without new code."""
+
+    name: str
+    value: float
+    unit: str = "1"
+    description: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class LinearSystem:
+    """A linear time-varying system, symbolically.
+
+    Parameters
+    ----------
+    name : str
+    time : SX scalar
+    x, w, u, p, v : SX column vectors
+        States, white noises, known inputs, parameters, and table values at ``time``.
+    derivative, output : SX
+        x' and y in terms of the symbols above; linear in x, w, u.
+    states, noises, outputs, parameters : tuples
+        What the entries of x, w, y and p are.
+    input_names : tuple of str
+    input_values : SX
+        The known inputs as functions of time, p and v, shape (n_u,).
+    tables : tuple of TableGroup
+        Their values, group by group, are v.
+    start_covariance : mapping of source to (n, n) SX or array
+        Covariance P0 of the states at the start that a source brings; a function of p. Missing means zero.
+    discontinuities : tuple of float
+        Times at which a table or a matrix jumps, s; integrators stop there. They are put in order, each once. A
+        condition on time in the expressions needs no declaration: it is located (:meth:`stops`).
+    start, end : float
+        Times between which the system is defined, s.
+    coupling_matrix : SX, optional
+        A symmetric matrix whose inverse stands in the equations; checked to be positive definite.
+    structure : mapping of str to str
+        What the system is made of, in words; used to say why code is generated again.
+
+    Raises
+    ------
+    SystemDefinitionError
+        Names and units that are empty or hold control characters, sizes and values that are not finite, symbols that
+        are expressions or stand for two things, a start covariance that is none, no states or no outputs.
+    NonlinearSystemError
+        If an expression is not linear in x, w, u, or depends on a symbol that was not declared.
+    UnknownNameError
+        A start covariance for a source that is not there.
+    SwitchError
+        If a condition (a comparison, floor, sign, ...) depends on a table.
+    """
+
+    name: str
+    time: ca.SX
+    x: ca.SX
+    w: ca.SX
+    u: ca.SX
+    p: ca.SX
+    v: ca.SX
+    derivative: ca.SX
+    output: ca.SX
+    states: tuple[State, ...]
+    noises: tuple[Noise, ...]
+    outputs: tuple[Output, ...]
+    parameters: tuple[Parameter, ...] = ()
+    input_names: tuple[str, ...] = ()
+    input_values: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
+    tables: tuple[TableGroup, ...] = ()
+    start_covariance: Mapping[str, ca.SX | np.ndarray] = field(default_factory=dict)
+    discontinuities: tuple[float, ...] = ()
+    start: float = 0.0
+    end: float = float("inf")
+    coupling_matrix: ca.SX | None = None
+    structure: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self):
+        check_labels(self)
+        sizes = {
+            "states": (self.x.numel(), len(self.states), self.derivative.numel()),
+            "noises": (self.w.numel(), len(self.noises)),
+            "inputs": (self.u.numel(), len(self.input_names), self.input_values.numel()),
+            "parameters": (self.p.numel(), len(self.parameters)),
+            "table values": (self.v.numel(), sum(len(g.names) for g in self.tables)),
+            "outputs": (self.output.numel(), len(self.outputs)),
+        }
+        for what, counts in sizes.items():
+            if len(set(counts)) > 1:
+                raise SystemDefinitionError(f"system '{self.name}': {what} disagree in number: {counts}")
+        if not self.end > self.start:
+            raise TimeRangeError(f"system '{self.name}' ends at {self.end:g} s, before its start at {self.start:g} s")
+        object.__setattr__(self, "discontinuities", switch_times(self.discontinuities, self.start))
+        for label, names in (
+            ("state", self.state_names),
+            ("noise", self.noise_names),
+            ("output", self.output_names),
+            ("parameter", self.parameter_names),
+            ("input", self.input_names),
+        ):
+            repeated = {n for n in names if names.count(n) > 1}
+            if repeated:
+                raise SystemDefinitionError(f"system '{self.name}' has more than one {label} '{repeated.pop()}'")
+        check_symbols(self)
+        check_keys("noise source", self.start_covariance, self.sources)
+        covariance = {
+            source: checked_covariance(self, source, given) for source, given in self.start_covariance.items()
+        }
+        object.__setattr__(self, "start_covariance", covariance)
+        signals = ca.vertcat(self.x, self.w, self.u)
+        for what, expression, labels in (
+            ("derivative of", self.derivative, self.state_names),
+            ("output", self.output, self.output_names),
+        ):
+            free = ca.symvar(ca.veccat(expression, self.input_values))
+            known = {e.__hash__() for e in ca.symvar(ca.veccat(signals, self.time, self.p, self.v))}
+            unknown = [e.name() for e in free if e.__hash__() not in known]
+            if unknown:
+                raise NonlinearSystemError(
+                    f"system '{self.name}' uses the symbol '{unknown[0]}', which is neither a state, input, "
+                    "noise nor parameter of it; declare it"
+                )
+            for i, label in enumerate(labels):
+                row = ca.jacobian(expression[i], signals)
+                at_rest = ca.substitute(expression[i], signals, ca.DM.zeros(signals.numel()))
+                if ca.depends_on(row, signals) or not ca.simplify(at_rest).is_zero():
+                    raise NonlinearSystemError(
+                        f"system '{self.name}': the {what} '{label}' is not linear in states, noises and inputs; "
+                        "linearise it about the mean flight"
+                    )
+        _ = self.conditions
+
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        return tuple(s.name for s in self.states)
+
+    @property
+    def noise_names(self) -> tuple[str, ...]:
+        return tuple(n.name for n in self.noises)
+
+    @property
+    def output_names(self) -> tuple[str, ...]:
+        return tuple(o.name for o in self.outputs)
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        return tuple(p.name for p in self.parameters)
+
+    @property
+    def sources(self) -> tuple[str, ...]:
+        """Noise sources in the order of their first noise input."""
+        return tuple(dict.fromkeys(n.source for n in self.noises))
+
+    def noise_columns(self, source: str) -> list[int]:
+        """Return the columns of B and D that belong to a source."""
+        if source not in self.sources:
+            raise UnknownNameError("noise source", source, self.sources)
+        return [i for i, n in enumerate(self.noises) if n.source == source]
+
+    def output_index(self, name: str) -> int:
+        """Return the row of a response in C and D."""
+        if name not in self.output_names:
+            raise UnknownNameError("response", name, self.output_names)
+        return self.output_names.index(name)
+
+    def refuse_direct_noise(self, outputs: Iterable[str]) -> None:
+        """Raise if white noise reaches one of the outputs directly.
+
+        Raises
+        ------
+        DirectNoiseError
+            Names source, output and the way out.
+        """
+        rows, columns = self.D.sparsity().row(), self.D.sparsity().get_col()
+        for name in outputs:
+            for row, column in zip(rows, columns, strict=True):
+                if row == self.output_index(name) and not self.D[row, column].is_zero():
+                    raise DirectNoiseError(
+                        f"white noise of source '{self.noises[column].source}' reaches '{name}' directly, so that its "
+                        "variance is infinite; colour the noise (white = false with a correlation time) or leave the "
+                        "response out"
+                    )
+
+    @cached_property
+    def conditions(self) -> tuple[Condition, ...]:
+        """Conditions on time in the expressions: comparisons, floor, sign, fmod, ... of time and parameters."""
+        signals = ca.vertcat(self.x, self.w, self.u)
+        expressions = (self.derivative, self.output, self.input_values)
+        return find_conditions(expressions, self.time, self.p, self.v, signals, self.name)
+
+    def stops(self, parameters: np.ndarray, until: float) -> Stops:
+        """Return where integrators stop for given parameters: declared discontinuities and located switches.
+
+        Parameters
+        ----------
+        parameters : (n_p,) array
+        until : float
+            s; those beyond it may be among them.
+
+        Raises
+        ------
+        SwitchError
+            If a condition cannot be located; it says which and why.
+        """
+        end = self.end
+        if not np.isfinite(end):  # doubled, so that few searches serve all end times
+            end = self.start + 2.0 ** np.ceil(np.log2(max(until - self.start, 1.0)))
+        return _located(self, np.asarray(parameters, float).tobytes() if self.conditions else b"", float(end))
+
+    @cached_property
+    def A(self) -> ca.SX:
+        """State matrix, (n, n)."""
+        return ca.jacobian(self.derivative, self.x)
+
+    @cached_property
+    def B(self) -> ca.SX:
+        """Noise matrix, (n, n_w)."""
+        return ca.jacobian(self.derivative, self.w)
+
+    @cached_property
+    def C(self) -> ca.SX:
+        """Output matrix, (n_y, n)."""
+        return ca.jacobian(self.output, self.x)
+
+    @cached_property
+    def D(self) -> ca.SX:
+        """Noise feedthrough, (n_y, n_w)."""
+        return ca.jacobian(self.output, self.w)
+
+    @cached_property
+    def E(self) -> ca.SX:
+        """Matrix of the known inputs in x', (n, n_u)."""
+        return ca.jacobian(self.derivative, self.u)
+
+    @cached_property
+    def G(self) -> ca.SX:
+        """Matrix of the known inputs in y, (n_y, n_u)."""
+        return ca.jacobian(self.output, self.u)
+
+    def adjoint_derivative(self, adjoint: ca.SX) -> ca.SX:
+        """Return -A^T times the columns of ``adjoint``, derived as CasADi's transposed Jacobian product."""
+        return -ca.jtimes(self.derivative, self.x, adjoint, True)
+
+    def start_covariance_matrix(self, source: str, values: np.ndarray) -> np.ndarray:
+        """Return P0 of a source for the parameter values ``values``, shape (n, n).
+
+        Raises
+        ------
+        SystemDefinitionError
+            These values make it indefinite or not finite.
+        """
+        n = len(self.states)
+        given = self.start_covariance.get(source)
+        if given is None:
+            return np.zeros((n, n))
+        if isinstance(given, np.ndarray):
+            return given
+        found = np.array(ca.Function("p0", [self.p], [ca.densify(given)])(values), dtype=float).reshape(n, n)
+        check_covariance(self, source, found)
+        return found
+
+
+@lru_cache(maxsize=64)
+def _located(system: LinearSystem, parameters: bytes, end: float) -> Stops:
+    return locate(system.conditions, system.discontinuities, np.frombuffer(parameters), system.start, end, system.name)
+
+
+COMBINED = "combined"

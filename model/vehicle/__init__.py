@@ -1,0 +1,1 @@
+"""A vehicle: its file, its tables and their columns, and the ones that ship."""

@@ -1,0 +1,374 @@
+"""From a vehicle's folder to a vehicle: every table read, checked and put on common times."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import DataError, DataErrorCollector, PlausibilityWarning, WindWarning, suggestion
+from ..files.csv_table import CsvTable, read_csv_table
+from ..files.folder_files import file_inside
+from ..system.switches import switch_times
+from ..tables import Table
+from ..wind.filter_file import read_filter
+from ..wind.range_reference import check_against_edition
+from ..wind.record import WindOrigin, WindRecord
+from ..wind.shaping_filter import TwoPartKernel
+from ..wind.statistics import WindModel, check_plausible, closed_form_filter, report_standard_deviation
+from .columns import (
+    AERODYNAMICS,
+    GAINS,
+    MOVED_LINE,
+    MOVED_MODE,
+    PREFIX,
+    PROPULSION,
+    REACTION_COLUMNS,
+    RIGID_BODY,
+    SCHEDULE_COLUMNS,
+    SLOSH,
+    TRAJECTORY,
+    WIND,
+    _bending_columns,
+    load_columns,
+    local_columns,
+    local_load_columns,
+    mode_columns,
+)
+from .coverage import check_schedule, check_wind, loaded_flight
+from .names import name_faults
+from .noise_loads import check_noises, form_of_tables, needed_columns
+from .plausibility import check_plausibility
+from .vehicle import TableSource, Vehicle
+from .vehicle_file import TableEntry, VehicleFile, WindEntry, WindRecordEntry, read_vehicle_file
+
+VEHICLE_FILE = "vehicle.toml"
+
+
+def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehicle:
+    """Load a vehicle folder.
+
+    Parameters
+    ----------
+    folder : Path
+        Holds ``vehicle.toml`` and the CSV files it names.
+    changes : mapping, optional
+        Values to put in the place of the file's, by dotted key; see ``read_vehicle_file``.
+
+    Raises
+    ------
+    DataError
+        Names the file, column and row at fault.
+
+    Warns
+    -----
+    ExtrapolationWarning, WindWarning
+        A schedule or the wind is held where the flight is loaded; mean and filter of the wind do not fit together, or
+        have no record.
+    """
+    toml = folder / VEHICLE_FILE
+    if not toml.is_file():
+        raise DataError(f"holds no {VEHICLE_FILE}; start from 'ascentwind new-vehicle DIR --from as504'", file=folder)
+    file = read_vehicle_file(file_inside(folder, VEHICLE_FILE), changes)
+    _refuse_unused(changes or {}, file, toml)
+    reader = _Reader(folder, toml, file)
+    reader.collector.errors += [DataError(why, file=toml, column=key) for key, why in name_faults(file)]
+    for name, columns in (
+        ("rigid_body", RIGID_BODY),
+        ("trajectory", TRAJECTORY),
+        ("propulsion", PROPULSION),
+        ("aerodynamics", AERODYNAMICS),
+    ):
+        reader.add(name, getattr(file.tables, name), columns)
+    reader.add("control.gains", file.control.gains, GAINS, "control.")
+    _add_load_relief(reader, file)
+    tanks = [tank.name for tank in file.slosh]
+    file = _with_noise_loads(file, folder, toml)
+    of_loads, of_modes = needed_columns(file)
+    for i, mode in enumerate(file.bending, start=1):
+        reader.add(f"bending.{i}", mode.table, (*_bending_columns(tanks), *of_modes), f"bending.{i}.", (MOVED_MODE,))
+    for tank in file.slosh:
+        reader.add(f"slosh.{tank.name}", tank.table, SLOSH, f"slosh.{tank.name}.")
+    for load in file.loads:
+        columns = dict.fromkeys((*load_columns(len(file.bending), tanks), *of_loads))
+        if file.options.slosh_reaction:
+            if load.forward_of_gimbal_m is None:
+                raise DataError(
+                    "is missing, but options.slosh_reaction needs it; give metres forward of the gimbal plane",
+                    file=toml,
+                    column=f"loads.{load.output}.forward_of_gimbal_m",
+                )
+            columns |= dict.fromkeys(REACTION_COLUMNS)
+        unused = (*REACTION_COLUMNS, MOVED_LINE)
+        reader.add(f"loads.{load.output}", load.table, tuple(columns), f"loads.{load.output}.", unused)
+    if file.options.local_angle_of_attack:
+        _add_local(reader, file)
+    wind = None
+    with reader.collector.part():
+        wind = _load_wind(folder, file.wind, reader)
+    reader.collector.raise_all()
+    for name, noise in file.noise.items():
+        for table in noise.tables:
+            if table not in reader.tables:
+                why = f"there is no table '{table}'{suggestion(table, reader.tables)}"
+                reader.collector.errors.append(DataError(why, file=toml, column=f"noise.{name}"))
+    reader.collector.raise_all()
+    assert wind is not None  # its error was raised
+    timed = [s for s in reader.sources if not s.name.startswith(("wind", "control."))]
+    first, last = max(timed, key=lambda s: s.first), min(timed, key=lambda s: s.last)
+    start = file.start_time_s
+    if start < first.first:
+        raise DataError(
+            f"start_time_s = {start:g} lies before the first row of {first.file.name} at {first.first:g} s; "
+            "start later or extend the table",
+            file=toml,
+            column="start_time_s",
+        )
+    if start >= last.last:
+        raise DataError(
+            f"start_time_s = {start:g} is not before the end of {last.file.name} at {last.last:g} s",
+            file=toml,
+            column="start_time_s",
+        )
+    vehicle = Vehicle(
+        name=file.name,
+        title=file.title,
+        folder=folder,
+        file=file,
+        tables=reader.tables,
+        wind=wind,
+        start=start,
+        end=last.last,
+        discontinuities=switch_times((t for t in reader.discontinuities if start < t < last.last), start),
+        sources=tuple(reader.sources),
+    )
+    check_plausibility(vehicle)
+    _check_coverage(reader, wind, start, last.last)
+    return vehicle
+
+
+def _with_noise_loads(file: VehicleFile, folder: Path, toml: Path) -> VehicleFile:
+    """Check what noises do to the loads; where the file leaves it open, take the form that its tables allow."""
+    check_noises(file, toml)
+    if "noise_loads" in file.options.model_fields_set or not any(needed_columns(file)):
+        return file
+    form, warning = form_of_tables(folder, toml, file)
+    if warning is not None:
+        warnings.warn(warning, stacklevel=3)
+    return file.model_copy(update={"options": file.options.model_copy(update={"noise_loads": form})})
+
+
+def _refuse_unused(changes: Mapping[str, Any], file: VehicleFile, toml: Path) -> None:
+    """Refuse changes to what the vehicle's options leave aside."""
+    for key in changes:
+        parts = key.split(".")
+        for idle, concerned, why in (
+            (not file.wind.fitted, parts[:2] == ["wind", "filter"], 'wind.synthesis = "fitted"'),
+            (file.wind.fitted, parts[:2] == ["wind", "correlation"], 'wind.synthesis = "closed_form"'),
+            (
+                not file.options.local_angle_of_attack,
+                "local_aerodynamics" in parts or (parts[0] == "loads" and "local" in parts),
+                "options.local_angle_of_attack = true",
+            ),
+        ):
+            if idle and concerned:
+                raise DataError(f"changes nothing here; it is used with {why}", file=toml, column=key)
+
+
+def _add_load_relief(reader: _Reader, file: VehicleFile) -> None:
+    """Read gain schedules and bending modes of the load-relief sensors."""
+    for sensor, entry in file.control.load_relief.items():
+        prefix = f"control.{sensor}."
+        if entry.schedule:
+            reader.add(f"{prefix}schedule", entry.schedule, SCHEDULE_COLUMNS, prefix)
+        if entry.modes:
+            reader.add(f"load_relief.{sensor}", entry.modes, mode_columns(len(file.bending)), prefix)
+        elif file.bending:
+            columns = ", ".join(f"{name} [{unit}]" for name, unit, _ in mode_columns(len(file.bending)))
+            raise DataError(
+                f"is missing; name a table of {columns} at the sensor", file=reader.toml, column=f"{prefix}modes"
+            )
+
+
+def _add_local(reader: _Reader, file: VehicleFile) -> None:
+    """Read the integrals that the option local_angle_of_attack needs."""
+    modes, missing = (
+        len(file.bending),
+        "is missing, but options.local_angle_of_attack needs it; 'ascentwind build-vehicle' makes it",
+    )
+    if file.tables.local_aerodynamics is None:
+        raise DataError(missing, file=reader.toml, column="tables.local_aerodynamics")
+    reader.add("local_aerodynamics", file.tables.local_aerodynamics, local_columns(modes), PREFIX)
+    for load in file.loads:
+        if load.local is None:
+            raise DataError(missing, file=reader.toml, column=f"loads.{load.output}.local")
+        name = f"{PREFIX}loads.{load.output}"
+        reader.add(name, load.local, local_load_columns(modes), f"{name}.")
+
+
+class _Reader:
+    """Collects tables, their sources and the times at which they jump."""
+
+    def __init__(self, folder: Path, toml: Path, file: VehicleFile):
+        self.folder, self.toml, self.events, self.start = folder, toml, file.events, file.start_time_s
+        self.tables: dict[str, Table] = {}
+        self.sources: list[TableSource] = []
+        self.discontinuities: set[float] = set()
+        self.collector = DataErrorCollector()
+        self.schedules: dict[str, tuple[Table, Path]] = {}
+
+    def read(self, name: str, entry: TableEntry, columns, argument: str, unit: str, unused=()) -> CsvTable:
+        csv = read_csv_table(file_inside(self.folder, entry.file), argument, unit)
+        x, collector = csv.columns[argument], DataErrorCollector()
+        for column, column_unit, sign in columns:
+            with collector.part():
+                csv.column(column, column_unit)
+                if sign:
+                    csv.require_positive(column, allow_zero=sign == "0")
+        collector.raise_all()
+        unknown = set(csv.columns) - {c for c, _, _ in (*columns, *unused)} - {argument}
+        if unknown:
+            name = sorted(unknown)[0]
+            raise DataError(
+                f"is not a column that this table uses{suggestion(name, [c for c, _, _ in columns])}; remove it",
+                file=csv.file,
+                column=name,
+            )
+        self.sources.append(TableSource(name, csv.file, entry.status, entry.source, float(x[0]), float(x[-1])))
+        return csv
+
+    def add(self, name: str, entry: TableEntry, columns, prefix: str = "", unused=()) -> None:
+        """Read a table; what is wrong with it is kept in ``collector``."""
+        with self.collector.part():
+            self._add(name, entry, columns, prefix, unused)
+
+    def _add(self, name: str, entry: TableEntry, columns, prefix: str, unused) -> None:
+        csv = self.read(name, entry, columns, "time", "s", unused)
+        for event in entry.events:
+            if event not in self.events:
+                raise DataError(
+                    f"event '{event}' is not listed under [events]{suggestion(event, self.events)}",
+                    file=self.toml,
+                    column=name,
+                )
+        breaks = tuple(sorted(self.events[event] for event in entry.events))
+        self.discontinuities.update(breaks)
+        x = csv.columns["time"]
+        _warn_of_gap(csv)
+        if entry.interpolation == "step":
+            self.discontinuities.update(x[1:].tolist())
+        for column, unit, sign in columns:
+            try:
+                table = Table(prefix + column, unit, x, csv.columns[column], entry.interpolation, breaks)
+                self._check_between_rows(table, sign)
+            except DataError as error:
+                raise DataError(error.why, file=csv.file, column=column, time=error.time) from None
+            self.tables[table.name] = table
+            if name.startswith("control."):
+                self.schedules[name] = (table, csv.file)
+
+    def _check_between_rows(self, table: Table, sign: str) -> None:
+        """Refuse an interpolation that leaves the range its rows keep, and an altitude that does not increase."""
+        begin, end = max(self.start, table.argument[0]), table.argument[-1]
+        if begin >= end:
+            return
+        times = np.linspace(begin, end, 20 * table.argument.size)
+        values = table.polynomial(times)
+        if sign == "+" and not (values > 0).all():
+            raise DataError(
+                "the interpolation between rows is not positive; add rows or set interpolation = 'pchip'",
+                time=float(times[int(np.argmin(values))]),
+            )
+        if table.name == "altitude":
+            rate = table.polynomial.derivative()(times)
+            if not (rate > 0).all():
+                raise DataError(
+                    "does not increase, but the wind filter needs a vehicle that ascends; end the tables there, start "
+                    "later or set interpolation = 'pchip'",
+                    time=float(times[int(np.argmin(rate))]),
+                )
+
+
+def _warn_of_gap(csv: CsvTable) -> None:
+    """Warn of rows far apart where the others are close: the values between them are interpolated."""
+    x = csv.columns["time"]
+    steps = np.diff(x)
+    widest, usual = int(np.argmax(steps)), float(np.median(steps))
+    if steps.size >= 10 and steps[widest] > max(10 * usual, 0.05 * (x[-1] - x[0])):
+        warnings.warn(
+            PlausibilityWarning(
+                f"{csv.file}, line {csv.lines[widest + 1]}: no rows between {x[widest]:g} and {x[widest + 1]:g} s, "
+                f"where others are {usual:g} s apart; values there are interpolated. Add the rows if they were lost"
+            ),
+            stacklevel=2,
+        )
+
+
+def _load_wind(folder: Path, entry: WindEntry, reader: _Reader) -> WindModel:
+    csv = reader.read("wind", entry.statistics, WIND, "altitude", "m")
+    h, mean, sigma = (csv.columns[name] for name in ("altitude", "mean", "standard_deviation"))
+    record = _wind_record(entry.record, reader.toml)
+    try:
+        check_plausible("the wind's statistics", h, mean, sigma)
+        if record is not None:
+            check_against_edition(record, h, mean, sigma)
+    except DataError as error:
+        raise DataError(error.why, file=csv.file) from None
+    if entry.standard_deviation == "cr103010_fit":
+        sigma = report_standard_deviation(h)
+    interpolation = entry.statistics.interpolation
+    mean_table = Table("wind.mean", "m/s", h, mean, interpolation)
+    deviation = Table("wind.standard_deviation", "m/s", h, sigma, interpolation)
+    if entry.fitted:
+        assert entry.filter is not None  # checked by WindEntry
+        file = file_inside(folder, entry.filter)
+        shaping_filter = read_filter(file)
+        low, high = (float(x) for x in shaping_filter.altitude[[0, -1]])
+        reader.sources.append(TableSource("wind.filter", file, "computed", shaping_filter.source, low, high))
+    else:
+        assert entry.correlation is not None
+        knots, file = entry.correlation, reader.toml
+        kernel = TwoPartKernel(
+            *(
+                (np.array(profile.altitude_m), np.array(profile.value))
+                for profile in (knots.long_scale_m, knots.short_scale_m, knots.short_fraction)
+            ),
+            source=knots.source,
+        )
+        shaping_filter = closed_form_filter(kernel, deviation)
+    try:
+        return WindModel(mean_table, shaping_filter, deviation, record)
+    except DataError as error:
+        raise DataError(error.why, file=file) from None
+
+
+def _wind_record(entry: WindRecordEntry | None, toml: Path) -> WindRecord | None:
+    if entry is None:
+        warnings.warn(
+            WindWarning(
+                f"{toml} holds no [wind.record]: nobody can tell whether mean and filter are of one wind; 'ascentwind "
+                "wind apply VEHICLE --component zonal|meridional' writes filter, mean and record together"
+            ),
+            stacklevel=4,
+        )
+        return None
+    origin = WindOrigin(entry.site, entry.component, entry.period, entry.edition)
+    try:
+        return WindRecord(origin, math.radians(entry.azimuth_deg), entry.sign, entry.held_above_m, entry.source)
+    except DataError as error:
+        raise DataError(error.why, file=toml, column="wind.record") from None
+
+
+def _check_coverage(reader: _Reader, wind: WindModel, start: float, end: float) -> None:
+    """Hold schedules of the control system and the wind against the part of the flight that they must cover."""
+    flight = loaded_flight(reader.tables, start, end)
+    for name, (table, file) in reader.schedules.items():
+        check_schedule(name, table, flight, file)
+    try:
+        check_wind(wind, flight)
+    except DataError as error:
+        raise DataError(error.why, file=reader.toml, column="wind") from None

@@ -1,0 +1,250 @@
+"""What a vehicle's TOML file may hold (pydantic)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, model_validator
+
+from ..files.folder_files import FileName
+from ..files.toml_file import Name, NotNegative, Positive, Section, read_toml
+
+ExtraOutput = Literal["lateral_drift", "drift_rate", "dynamic_pressure_times_angle_of_attack", "load_components"]
+NoiseLoads = Literal["moved_line", "couple_forward", "couple_aft", "as_reported"]
+
+
+class TableEntry(Section):
+    """One CSV file: where it is, how it is interpolated, and where its numbers come from."""
+
+    file: FileName
+    status: Literal["found", "computed", "assumed"]
+    source: str
+    interpolation: Literal["cubic", "pchip", "linear", "step"] = "cubic"
+    events: tuple[str, ...] = ()
+
+
+class TransferFunctionEntry(Section):
+    """Numerator and denominator in descending powers of s, as the report prints them."""
+
+    numerator: tuple[float, ...]
+    denominator: tuple[float, ...]
+    source: str = ""
+
+    @model_validator(mode="after")
+    def _proper(self):
+        if not self.numerator or not self.denominator or self.denominator[0] == 0:
+            raise ValueError("needs a numerator and a denominator whose first coefficient is not zero")
+        if len(self.numerator) > len(self.denominator):
+            raise ValueError("has a numerator of higher order than its denominator; add the missing poles")
+        return self
+
+
+class SensorFeedbackEntry(Section):
+    """Feedback of a load-relief sensor into the engine command.
+
+    ``modes`` holds displacement and slope of the bending modes at the sensor, ``schedule`` factors on the gain.
+    """
+
+    position_m: float
+    gain: float
+    filter: TransferFunctionEntry
+    modes: TableEntry | None = None
+    schedule: TableEntry | None = None
+    source: str = ""
+
+    @model_validator(mode="after")
+    def _strictly_proper(self):
+        if len(self.filter.numerator) >= len(self.filter.denominator):
+            raise ValueError(
+                "has a filter with as many zeros as poles: wind and engine angle would return to the engine command "
+                "without delay; add a pole, the sensor's bandwidth"
+            )
+        return self
+
+
+class ControlEntry(Section):
+    """Control law 4-4; ``accelerometer`` and ``angle_of_attack`` are load relief, absent in the report."""
+
+    T1: TransferFunctionEntry
+    T2: TransferFunctionEntry
+    T3: TransferFunctionEntry
+    gains: TableEntry
+    accelerometer: SensorFeedbackEntry | None = None
+    angle_of_attack: SensorFeedbackEntry | None = None
+
+    @property
+    def load_relief(self) -> dict[str, SensorFeedbackEntry]:
+        """Feedback of load-relief sensors by name; empty without any."""
+        entries = {"accelerometer": self.accelerometer, "angle_of_attack": self.angle_of_attack}
+        return {sensor: entry for sensor, entry in entries.items() if entry is not None}
+
+
+class BendingEntry(Section):
+    damping: NotNegative
+    table: TableEntry
+
+
+class SloshEntry(Section):
+    name: Name
+    damping: NotNegative
+    table: TableEntry
+
+
+class LoadEntry(Section):
+    """A bending moment. ``forward_of_gimbal_m`` is ``station_m`` from the gimbal plane; slosh_reaction needs it."""
+
+    output: Name
+    station_m: float
+    forward_of_gimbal_m: float | None = None
+    table: TableEntry
+    local: TableEntry | None = None
+
+
+class NoiseEntry(Section):
+    """A relative deviation of the named tables, coloured unless ``white`` is set."""
+
+    tables: tuple[str, ...]
+    sigma: NotNegative
+    correlation_time_s: Positive = 1.0
+    white: bool = False
+    source: str = ""
+
+
+class Profile(Section):
+    """Knots over altitude."""
+
+    altitude_m: tuple[float, ...]
+    value: tuple[float, ...]
+
+    @model_validator(mode="after")
+    def _ordered(self):
+        if len(self.altitude_m) != len(self.value) or len(self.value) < 2:
+            raise ValueError("needs as many values as altitudes, two at least")
+        if any(b <= a for a, b in zip(self.altitude_m[:-1], self.altitude_m[1:], strict=True)):
+            raise ValueError("needs altitudes that increase")
+        if any(v <= 0 for v in self.value):
+            raise ValueError("needs positive values")
+        return self
+
+
+class CorrelationEntry(Section):
+    """Two-part kernel: a Matern-3/2 part of length ``long_scale_m`` and an exponential part of ``short_scale_m``."""
+
+    long_scale_m: Profile
+    short_scale_m: Profile
+    short_fraction: Profile
+    source: str
+
+    @model_validator(mode="after")
+    def _fraction(self):
+        if any(v >= 1 for v in self.short_fraction.value):
+            raise ValueError("needs short_fraction between 0 and 1")
+        return self
+
+
+class WindRecordEntry(Section):
+    """Of which wind statistics and filter are; written by 'ascentwind wind apply'."""
+
+    site: str
+    component: Literal["zonal", "meridional"]
+    period: str
+    edition: str
+    azimuth_deg: Annotated[float, Field(ge=-360, le=360)]
+    sign: Literal[1, -1]
+    held_above_m: float
+    source: str
+
+
+class WindEntry(Section):
+    """``synthesis`` chooses between ``filter``, a file of 'ascentwind wind fit', and [wind.correlation]."""
+
+    synthesis: Literal["fitted", "closed_form"] | None = None
+    statistics: TableEntry
+    standard_deviation: Literal["table", "cr103010_fit"] = "table"
+    filter: FileName | None = None
+    correlation: CorrelationEntry | None = None
+    record: WindRecordEntry | None = None
+
+    @model_validator(mode="after")
+    def _one_filter(self):
+        if self.filter is None and self.correlation is None:
+            raise ValueError('needs filter = "FILE" (ascentwind wind fit) or [wind.correlation] (closed form)')
+        if self.synthesis is None and self.filter is not None and self.correlation is not None:
+            raise ValueError(
+                'has both a filter and [wind.correlation]; choose with synthesis = "fitted" or "closed_form"'
+            )
+        if self.fitted and self.filter is None:
+            raise ValueError('has synthesis = "fitted" but no filter = "FILE"; write one with \'ascentwind wind fit\'')
+        if not self.fitted and self.correlation is None:
+            raise ValueError('has synthesis = "closed_form" but no [wind.correlation]; add it or take "fitted"')
+        if self.fitted and self.standard_deviation != "table":
+            raise ValueError(
+                f'has standard_deviation = "{self.standard_deviation}", which only the closed form takes: a fitted '
+                'filter holds its own; set synthesis = "closed_form" or remove it'
+            )
+        return self
+
+    @property
+    def fitted(self) -> bool:
+        """Whether the filter file is used, not the closed form."""
+        return self.synthesis == "fitted" or (self.synthesis is None and self.filter is not None)
+
+
+class OptionsEntry(Section):
+    full_coupling: bool = False
+    local_angle_of_attack: bool = False
+    slosh_reaction: bool = False
+    noise_loads: NoiseLoads = "moved_line"
+    mean_response: Literal["linear", "nonlinear"] = "linear"
+    extra_outputs: tuple[ExtraOutput, ...] = ()
+
+
+class TablesEntry(Section):
+    rigid_body: TableEntry
+    trajectory: TableEntry
+    propulsion: TableEntry
+    aerodynamics: TableEntry
+    local_aerodynamics: TableEntry | None = None
+    loads_along_vehicle: TableEntry | None = None
+
+
+class VehicleFile(Section):
+    """The whole TOML file."""
+
+    format: Literal[1]
+    name: Name
+    title: str
+    start_time_s: float
+    default_times: str
+    weighting_times_s: tuple[float, ...] = ()
+    reference_area_m2: Positive
+    reference_area_source: str = ""
+    events: dict[str, float] = Field(default_factory=dict)
+    tables: TablesEntry
+    control: ControlEntry
+    bending: tuple[BendingEntry, ...] = ()
+    slosh: tuple[SloshEntry, ...] = ()
+    loads: tuple[LoadEntry, ...] = ()
+    noise: dict[Name, NoiseEntry] = Field(default_factory=dict)
+    wind: WindEntry
+    options: OptionsEntry = OptionsEntry()
+
+
+def read_vehicle_file(file: Path, changes: Mapping[str, Any] | None = None) -> VehicleFile:
+    """Read and check a vehicle's TOML file.
+
+    Parameters
+    ----------
+    file : Path
+    changes : mapping, optional
+        Values to put in the place of the file's, by dotted key: ``{"options.full_coupling": True}``. Items of a list
+        count from 0 (``bending.0.damping``).
+
+    Raises
+    ------
+    DataError
+        The file, the key in it, what is wrong and the nearest valid key.
+    """
+    return read_toml(file, VehicleFile, changes)

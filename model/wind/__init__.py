@@ -1,0 +1,1 @@
+"""The wind: statistics, correlation, shaping filters and their files, turbulence."""

@@ -1,0 +1,76 @@
+"""The covariance of a wind filter carried upward over altitude."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import expm
+
+from ..errors import DataError
+from .shaping_filter import ShapingFilter
+
+SPACING = 250.0  # m, at most, of the steps, which end at the filter's samples
+GAUSS = 0.5 / np.sqrt(3.0)
+
+
+def divided(altitude: NDArray[np.float64], spacing: float) -> list[NDArray[np.float64]]:
+    """Divide each interval between altitudes equally, into steps of at most ``spacing``; one array of edges each."""
+    return [
+        np.linspace(a, b, max(1, int(np.ceil((b - a) / spacing - 1e-9))) + 1) for a, b in itertools.pairwise(altitude)
+    ]
+
+
+def transitions(shaping_filter: ShapingFilter, edges: NDArray[np.float64]) -> tuple[NDArray, NDArray]:
+    """Return Phi and the covariance that the noise adds, for each step between edges (k + 1,), both (k, n, n).
+
+    One Magnus step of fourth order each; coefficients must be smooth inside a step.
+    """
+    step = np.diff(edges)[:, None, None]
+    middle, n = 0.5 * (edges[:-1] + edges[1:]), shaping_filter.order
+    blocks = []
+    for side in (-GAUSS, GAUSS):
+        F, G, _ = shaping_filter.at(middle + side * step[:, 0, 0])
+        block = np.zeros((middle.size, 2 * n, 2 * n))
+        block[:, :n, :n], block[:, :n, n:], block[:, n:, n:] = F, G @ G.swapaxes(1, 2), -F.swapaxes(1, 2)
+        blocks.append(block)
+    first, second = blocks
+    exponential = expm(0.5 * step * (first + second) + np.sqrt(3) / 12 * step**2 * (second @ first - first @ second))
+    phi = exponential[:, :n, :n]
+    return phi, exponential[:, :n, n:] @ phi.swapaxes(1, 2)
+
+
+def standard_deviation(shaping_filter: ShapingFilter, altitude: ArrayLike) -> NDArray[np.float64]:
+    """Return the standard deviation of the wind that a filter makes at altitudes (m), m/s, as it flies.
+
+    Below the filter's first altitude it is that of its start; above the last its coefficients are held.
+
+    Raises
+    ------
+    DataError
+        A covariance that grows beyond all bounds.
+    """
+    wanted = np.asarray(altitude, float)
+    start = float(shaping_filter.altitude[0])
+    points, inverse = np.unique(np.maximum(wanted, start), return_inverse=True)
+    top = float(points[-1])
+    P = shaping_filter.start_covariance
+    found = {start: P}
+    if top > start:
+        samples = shaping_filter.altitude
+        corners = np.unique(np.concatenate([[start], samples[samples < top], points]))
+        edges = np.concatenate([[start], *(part[1:] for part in divided(corners, SPACING))])
+        with np.errstate(all="ignore"):
+            for high, phi, added in zip(edges[1:], *transitions(shaping_filter, edges), strict=True):
+                P = phi @ P @ phi.T + added
+                found[float(high)] = P
+    H = shaping_filter.at(points)[2]
+    variance = np.array([h @ found[float(x)] @ h for x, h in zip(points, H, strict=True)])
+    if not np.isfinite(variance).all():
+        at = points[int(np.argmin(np.isfinite(variance)))]
+        raise DataError(
+            f"the wind of filter '{shaping_filter.name}' has no finite variance at {at:g} m; its F must be in 1/m and "
+            "decay"
+        )
+    return np.sqrt(np.maximum(variance, 0.0))[inverse].reshape(wanted.shape)

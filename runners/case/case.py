@@ -1,0 +1,222 @@
+"""What a study holds: a vehicle or system with its numbers, and what follows from them at one time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...codegen.system.executable import ExecutableSystem, executable_system
+from ...model.equations.assemble import assemble
+from ...model.errors import DataError, NotPicklableError, ParameterValueError, TimeRangeError, UnknownNameError
+from ...model.system.linear_system import LinearSystem, Parameter
+from ...model.tables import table_values
+from ...model.vehicle.coverage import check_wind, loaded_flight
+from ...model.vehicle.reader import load_vehicle
+from ...model.vehicle.shipped import find_vehicle
+from ...model.vehicle.vehicle import Vehicle
+from ...model.wind.statistics import WindModel
+from ..solvers.mean_response import with_mean_tables
+from ..solvers.planar_mean import with_nonlinear_mean
+from ..solvers.stability import Root, check_coupling, matrices_at, roots
+from ..solvers.sweep import available_sweep, with_sweep_mean_tables
+from ..solvers.time_nodes import on_flight
+from .wind_start import covariance_at
+
+POSITIVE = ("correlation_time", "reference_area")
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A system with numbers; :class:`~ascentwind.runners.Study` asks the questions.
+
+    Attributes
+    ----------
+    executable : ExecutableSystem
+    vehicle : Vehicle or None
+        None for a system of one's own.
+    """
+
+    executable: ExecutableSystem
+    vehicle: Vehicle | None = None
+
+    def __reduce__(self) -> str:
+        raise NotPicklableError(
+            "a study holds symbols and compiled code, which do not travel between processes; send study.vehicle and "
+            "parameter values and make it there with Study.from_vehicle, or let 'ascentwind study' do so"
+        )
+
+    @classmethod
+    def load(cls, vehicle: str | Path, *, compile: bool = True, changes: Mapping[str, Any] | None = None) -> Self:
+        """Load a shipped vehicle by name, or a vehicle folder.
+
+        Parameters
+        ----------
+        vehicle : str or path
+        compile : bool
+            False uses CasADi's interpreter: the same numbers, slower.
+        changes : mapping, optional
+            Values in the place of those in vehicle.toml, by dotted key: ``{"options.full_coupling": True}``. They may
+            change the structure, which ``with_parameters`` cannot.
+
+        Raises
+        ------
+        UnknownNameError, DataError, SingularCouplingError, CompilerError
+        """
+        return cls.from_vehicle(load_vehicle(find_vehicle(vehicle), changes), compile=compile)
+
+    @classmethod
+    def from_vehicle(cls, vehicle: Vehicle, *, compile: bool = True) -> Self:
+        """Assemble a loaded vehicle and prepare its code."""
+        altitude = float(vehicle.tables["altitude"].polynomial(vehicle.start))
+        system = assemble(vehicle, covariance_at(vehicle.wind.shaping_filter, altitude))
+        executable = executable_system(system, compile)
+        check_coupling(executable)
+        return cls(executable, vehicle)
+
+    @classmethod
+    def from_system(cls, system: LinearSystem, *, compile: bool = True) -> Self:
+        """Prepare the code of a linear system of your own."""
+        return cls(executable_system(system, compile))
+
+    @property
+    def system(self) -> LinearSystem:
+        """The linear system: names of states, noises, outputs, and the symbolic matrices."""
+        return self.executable.system
+
+    @property
+    def parameters(self) -> dict[str, Parameter]:
+        """Every parameter by name, with its present value, unit and meaning."""
+        pairs = zip(self.system.parameters, self.executable.parameters, strict=True)
+        return {p.name: replace(p, value=float(value)) for p, value in pairs}
+
+    def with_parameters(self, changes: Mapping[str, float]) -> Self:
+        """Return a study with other parameter values; nothing is compiled.
+
+        Raises
+        ------
+        UnknownNameError
+            With the nearest parameter name.
+        ParameterValueError
+            For a value that is not finite, or a time or area that is not positive.
+        """
+        return type(self)(self.executable.with_numbers(parameters=self.numbers(changes)), self.vehicle)
+
+    def numbers(self, changes: Mapping[str, float]) -> NDArray[np.float64]:
+        names, values = self.system.parameter_names, self.executable.parameters.copy()
+        for name, value in changes.items():
+            if name not in names:
+                raise UnknownNameError("parameter", name, names)
+            try:
+                number = float(value)
+            except (TypeError, ValueError, OverflowError):
+                raise ParameterValueError(f"parameter '{name}' cannot be {value!r:.40}; give a number") from None
+            if not np.isfinite(number) or (name.rpartition(".")[2] in POSITIVE and number <= 0):
+                raise ParameterValueError(f"parameter '{name}' cannot be {number:g}; give a finite, sensible number")
+            values[names.index(name)] = number
+        return values
+
+    def with_wind(self, wind: WindModel) -> Self:
+        """Return a study of the same vehicle in another wind.
+
+        Parameters
+        ----------
+        wind : WindModel
+            Mean and filter of one wind.
+
+        Raises
+        ------
+        UnknownNameError
+            If the study has no vehicle.
+        DataError
+            A filter without its mean; a wind that the flight does not meet, or whose parts are of different winds.
+
+        Warns
+        -----
+        ExtrapolationWarning
+            The flight leaves the wind's altitudes where it is loaded: values are held at the last ones there.
+        WindWarning
+            The filter's standard deviation is more than a tenth from the table's.
+        """
+        if self.vehicle is None:
+            raise UnknownNameError("wind of a system of one's own", self.system.name, [])
+        if not isinstance(wind, WindModel):
+            raise DataError(
+                f"a wind is a mean and a filter of the same statistics, and {type(wind).__name__} is not: give "
+                "WindModel(statistics.mean_table(), filter)"
+            )
+        check_wind(wind, loaded_flight(self.vehicle.tables, self.vehicle.start, self.vehicle.end))
+        case = self.from_vehicle(replace(self.vehicle, wind=wind), compile=self.executable.shared_library is not None)
+        values = {n: p.value for n, p in self.parameters.items() if n in case.parameters}
+        return case.with_parameters(values)
+
+    @cached_property
+    def linear_means(self) -> ExecutableSystem:
+        """The system with its tables of the mean response filled in by the linear mean."""
+        engine = available_sweep(self.executable)
+        return with_mean_tables(self.executable) if engine is None else with_sweep_mean_tables(engine, self.executable)
+
+    @cached_property
+    def with_means(self) -> ExecutableSystem:
+        """The system with the tables of the mean response that the noise coefficients need, as the options ask."""
+        if self.vehicle is not None and self.vehicle.file.options.mean_response == "nonlinear":
+            return with_nonlinear_mean(self.vehicle, self.linear_means)
+        return self.linear_means
+
+    def matrices(self, time: float) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+        """Return A (n, n), B (n, n_w), C (n_y, n), D (n_y, n_w) at a time; names are in ``case.system``."""
+        self.checked_times([time])
+        m = matrices_at(self.with_means, float(time))
+        return m["A"], m["B"], m["C"], m["D"]
+
+    def roots(self, time: float) -> list[Root]:
+        """Return the eigenvalues of A frozen at a time, slowest first."""
+        self.checked_times([time])
+        return roots(self.executable, float(time))
+
+    def tables(self, time: float) -> dict[str, float]:
+        """Return every table value at a time (s) by name."""
+        self.checked_times([time])
+        return table_values(self.with_means.groups, float(time))
+
+    def require_linear_mean(self, what: str) -> None:
+        if self.vehicle is not None and self.vehicle.file.options.mean_response == "nonlinear":
+            raise ParameterValueError(f'{what} follows the linear mean response; set options.mean_response = "linear"')
+
+    def check_spacing(self, spacing: float) -> None:
+        if not spacing > 0:
+            raise TimeRangeError(f"a spacing of {spacing:g} s is not positive")
+
+    def checked_times(self, times: list[float]) -> None:
+        if not times:
+            raise TimeRangeError("no end time was given")
+        for time in times:
+            if not np.isfinite(time):
+                raise TimeRangeError(f"{time} is not a time")
+            if on_flight(self.system, [time])[0]:
+                continue
+            if time < self.system.start:
+                raise TimeRangeError(
+                    f"end time {time:g} s lies before the start at {self.system.start:g} s; "
+                    "choose a later one or an earlier start_time_s"
+                )
+            raise TimeRangeError(f"end time {time:g} s lies beyond {self._end_of_data()}")
+
+    def _end_of_data(self) -> str:
+        end = f"the end of the system at {self.system.end:g} s"
+        if self.vehicle is None:
+            return end
+        shortest = min((s for s in self.vehicle.sources if s.last == self.system.end), key=lambda s: s.name)
+        return f"the last row of {shortest.file.name} at {shortest.last:g} s; extend the table or ask for less"
+
+    def checked_responses(self, responses: Iterable[str] | None) -> list[str]:
+        if isinstance(responses, str):
+            responses = [responses]
+        names = list(self.system.output_names if responses is None else dict.fromkeys(responses))
+        self.system.refuse_direct_noise(names)
+        return names

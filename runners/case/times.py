@@ -1,0 +1,93 @@
+"""End times written as text: 'start:stop:step' or 'a,b,c' in seconds, or 'peak'."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from decimal import Decimal
+from typing import Literal
+
+import numpy as np
+
+from ...model.errors import TimeRangeError
+from ...model.files.numbers import parse_number
+from ...model.vehicle.vehicle import Vehicle
+
+MOST = 100_000
+
+
+def parse_times(text: str) -> list[float]:
+    """Return the times that a text names, the stop included; those of a grid are the decimals that a person would type.
+
+    Raises
+    ------
+    TimeRangeError
+        With the form expected.
+    """
+    form = "write START:STOP:STEP or T1,T2,... in seconds, such as 40:100:5"
+    try:
+        if ":" not in text:
+            return [parse_number(part) for part in text.split(",")]
+        parts = text.split(":")
+        start, stop, step = (parse_number(part) for part in parts)
+    except ValueError:
+        raise TimeRangeError(f"'{text}' does not name times; {form}") from None
+    if not all(np.isfinite((start, stop, step))) or step <= 0 or stop < start:
+        raise TimeRangeError(
+            f"'{text}' names no times: the stop comes before the start or the step is not positive; {form}"
+        )
+    if (stop - start) / step > MOST:
+        raise TimeRangeError(f"'{text}' names more than {MOST} times; take a larger step")
+    first, last, by = (Decimal(part.strip()) for part in parts)
+    return [float(first + k * by) for k in range(int((last - first) / by) + 1)]
+
+
+def end_times(times: Iterable[float]) -> list[float]:
+    """Return end times in seconds, increasing, each once.
+
+    Raises
+    ------
+    TimeRangeError
+        Something among them is not a number.
+    """
+    if isinstance(times, str) or not isinstance(times, Iterable):
+        raise TimeRangeError(f"{times!r} is not a list of times; give seconds, such as [75.0]")
+    return sorted({seconds(t) for t in times})
+
+
+def seconds(time: float) -> float:
+    """Return a time as a float.
+
+    Raises
+    ------
+    TimeRangeError
+    """
+    try:
+        return float(time)
+    except (TypeError, ValueError, OverflowError):
+        raise TimeRangeError(f"{time!r} is not a time; give seconds") from None
+
+
+def spread_over(times: Sequence[float], count: int) -> list[float]:
+    """Return at most ``count`` of the times, evenly spread, the first and the last among them."""
+    return [times[i] for i in np.unique(np.linspace(0, len(times) - 1, count).round().astype(int))]
+
+
+def time_of_greatest_dynamic_pressure(vehicle: Vehicle) -> float:
+    """Return the time (s) of the row with the greatest dynamic pressure."""
+    table = vehicle.tables["dynamic_pressure"]
+    return float(table.argument[int(np.argmax(table.values))])
+
+
+def parse_time_or_peak(text: str) -> float | Literal["peak"]:
+    """Return a time in seconds, or 'peak'.
+
+    Raises
+    ------
+    TimeRangeError
+    """
+    if text == "peak":
+        return "peak"
+    try:
+        return parse_number(text)
+    except ValueError:
+        raise TimeRangeError(f"'{text}' is not a time; give seconds or 'peak'") from None

@@ -1,0 +1,77 @@
+"""The readable C of a vehicle, kept beside the code, and the manifest that says what it is."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+from typing import Any
+
+from ...codegen.sweep.source import sweep_functions, sweep_source
+from ...codegen.system.functions import core_functions
+from ...codegen.system.source import c_source
+from ...codegen.toolchain.cache import describe_changes
+from ...model.system.linear_system import LinearSystem
+from ..present.files import prepare_folder, write_whole
+from ..study import Study
+
+
+def generated_files(system: LinearSystem) -> dict[str, str]:
+    """Return the texts of NAME.c (adjoint, mean, matrices), NAME_sweep.c and manifest.json for a system."""
+    sources = {
+        f"{system.name}.c": c_source(system, core_functions(system)),
+        f"{system.name}_sweep.c": sweep_source(system, sweep_functions(system)),
+    }
+    manifest: dict[str, Any] = {
+        "name": system.name,
+        "sha256": {name: hashlib.sha256(text.encode()).hexdigest() for name, text in sources.items()},
+        "sizes": {
+            "states": len(system.states),
+            "noises": len(system.noises),
+            "outputs": len(system.outputs),
+            "parameters": len(system.parameters),
+            "table_values": system.v.numel(),
+            "table_numbers": sum(g.size for g in system.tables),
+        },
+        "structure": dict(system.structure),
+        "states": list(system.state_names),
+        "noises": {n.name: n.source for n in system.noises},
+        "outputs": {o.name: o.unit for o in system.outputs},
+        "parameters": {p.name: p.unit for p in system.parameters},
+        "tables": {
+            g.name: {"argument": g.argument, "knots": g.knots.size, "names": list(g.names)} for g in system.tables
+        },
+    }
+    return {**sources, "manifest.json": json.dumps(manifest, indent=1) + "\n"}
+
+
+def regenerate(vehicle: str | Path, folder: Path) -> dict[Path, str]:
+    """Write the generated files of a vehicle and say of each whether and why it changed.
+
+    Raises
+    ------
+    OutputFolderError
+    """
+    system = Study.load(vehicle, compile=False).system
+    target = folder / system.name
+    prepare_folder(target)
+    before = _structure(target / "manifest.json")
+    states = {}
+    for name, text in generated_files(system).items():
+        path = target / name
+        if path.is_file() and path.read_text(encoding="utf-8") == text:
+            states[path] = "unchanged"
+            continue
+        changes = describe_changes(before, dict(system.structure)) if before else []
+        states[path] = (
+            f"written ({'; '.join(changes) or ('equations, names or code generator changed' if before else 'new')})"
+        )
+        write_whole(path, lambda p, text=text: p.write_text(text, encoding="utf-8"))
+    return states
+
+
+def _structure(manifest: Path) -> dict[str, str] | None:
+    try:
+        return json.loads(manifest.read_text(encoding="utf-8"))["structure"]
+    except (OSError, ValueError, KeyError):
+        return None

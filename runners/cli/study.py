@@ -1,0 +1,53 @@
+"""The command ``ascentwind study``: a parameter study from a TOML file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..present.terminal import console, errors, progress_bar
+from .exit_codes import INTERRUPTED
+
+
+def study(
+    file: Annotated[Path, typer.Argument(help="TOML file of the study (docs/studies.md).")],
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Folder for results, FILE-results without it. One that holds a part is continued."),
+    ] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(help="Dask scheduler, such as tcp://host:8786; this machine's cores without it.")
+    ] = None,
+) -> None:
+    """Parameter study: a grid, one parameter at a time, or a dispersion; resumed where a killed run stood."""
+    from ..parameter_study.plan import read_plan
+    from ..parameter_study.report import report
+    from ..parameter_study.run import run_parameter_study
+    from ..study import Study
+
+    plan = read_plan(file)
+    folder = out or Path(f"{file.stem}-results")
+    assert plan.vehicle is not None  # read_plan asks it of a file
+    with console.status("loading and preparing code"):
+        loaded = Study.load(plan.vehicle)
+    started = False
+    try:
+        with progress_bar() as progress:
+            task = progress.add_task("members", total=None)
+
+            def advance(count: int, total: int) -> None:
+                nonlocal started
+                if not started and count:
+                    progress.console.print(f"{count} of {total} members were stored in {folder} before", style="dim")
+                started = True
+                progress.update(task, completed=count, total=total)
+
+            result = run_parameter_study(file, folder, study=loaded, scheduler=scheduler, progress=advance)
+        with console.status("first-order prediction and figures"):
+            written = [folder / "study.nc", *report(result, folder, console)]
+    except KeyboardInterrupt:
+        errors.print(f"stopped; members done are stored in {folder}: run the same command again to go on from there")
+        raise typer.Exit(INTERRUPTED) from None
+    console.print(f"{len(written)} files in {folder}: {', '.join(p.name for p in written)}", soft_wrap=True)

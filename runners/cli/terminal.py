@@ -1,0 +1,81 @@
+"""What the command-line modules share: consoles, the vehicle argument, changes to it, and progress bars."""
+
+from __future__ import annotations
+
+import codecs
+import io
+import sys
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from ...model.errors import DataError, UnusedOptionError
+
+# for consoles whose encoding has no such character
+_PLAIN = {"σ": "sigma", "±": "+-", "·": ".", "²": "2", "₂": "2", "µ": "u", "–": "-", "…": "..."}
+
+
+def _plain_character(error: UnicodeError) -> tuple[str, int]:
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    return "".join(_PLAIN.get(c, "?") for c in error.object[error.start : error.end]), error.end
+
+
+def use_plain_characters() -> None:
+    """Print what a console's encoding lacks (sigma on cp1252) in other characters instead of ending there."""
+    codecs.register_error("plain", _plain_character)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="plain")
+
+
+def results_folder(vehicle: str, ending: str) -> Path:
+    """Return the folder for results where none is named: the vehicle's name and ``ending``, where one stands."""
+    return Path(f"{Path(vehicle).resolve().name or 'vehicle'}-{ending}")
+
+
+VehicleArgument = Annotated[str, typer.Argument(help="A shipped vehicle ('ascentwind vehicles') or a vehicle folder.")]
+
+
+def parse_changes(texts: Sequence[str]) -> dict[str, Any]:
+    """Return changes to a vehicle's file from 'KEY=VALUE' with a dotted key and a TOML value.
+
+    Raises
+    ------
+    DataError
+        With the form expected.
+    """
+    changes: dict[str, Any] = {}
+    for text in texts:
+        key, equals, value = text.partition("=")
+        if not equals or not key.strip():
+            raise DataError(f"'{text}' changes nothing; write KEY=VALUE, such as options.full_coupling=true")
+        try:
+            read = tomllib.loads(f"value = {value}")
+        except (ValueError, RecursionError):
+            raise DataError(f"'{value:.60}' is not a TOML value; text needs quotes, true and numbers none") from None
+        if list(read) != ["value"]:
+            raise DataError(f"'{value}' is more than one TOML value; write one --set for each key")
+        changes[key.strip()] = read["value"]
+    return changes
+
+
+def given(context: typer.Context, name: str) -> bool:
+    """Return whether an option was typed on the command line."""
+    source = context.get_parameter_source(name)
+    return source is not None and source.name == "COMMANDLINE"
+
+
+def refuse_unused(context: typer.Context, names: Sequence[str], why: str) -> None:
+    """Refuse options that were typed but would change nothing.
+
+    Raises
+    ------
+    UnusedOptionError
+    """
+    for parameter in context.command.params:
+        if parameter.name in names and given(context, parameter.name):
+            raise UnusedOptionError(f"{parameter.opts[0]} is not used {why}; leave it out")

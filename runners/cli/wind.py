@@ -1,0 +1,338 @@
+"""The command line of the wind: ``ascentwind wind apply``, ``stats``, ``fit``, ``check``, ``plot`` and ``compare``."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.table import Table
+
+from ...model.errors import DataError, OutputFolderError
+from ..present.terminal import console
+from .terminal import VehicleArgument, given, refuse_unused
+
+if TYPE_CHECKING:
+    from ...model.wind.shaping_filter import ShapingFilter
+
+app = typer.Typer(no_args_is_help=True, help="Wind statistics, and filters that turn white noise into that wind.")
+
+Period = Annotated[str, typer.Option(help="Month in English, or annual.")]
+Component = Annotated[str, typer.Option(help="zonal or meridional.")]
+Edition = Annotated[str, typer.Option(help="Range Reference Atmosphere: 1983 or 2006.")]
+Top = Annotated[float, typer.Option(help="Highest level, m.")]
+Soundings = Annotated[Path | None, typer.Option(help="CSV of soundings instead of the shipped tables.")]
+Out = Annotated[Path, typer.Option(help="Folder for results.")]
+
+
+TOP = 30000.0  # m, of the shipped tables
+
+
+def _statistics(
+    context: typer.Context,
+    period: str,
+    component: str,
+    edition: str,
+    top: float,
+    soundings: Path | None,
+    site: str | None = None,
+):
+    """Return the statistics that the options name; ``site`` is that of the soundings."""
+    from ...model.errors import UnknownNameError
+    from ...model.wind.range_reference import shipped_statistics
+    from ...model.wind.record import COMPONENTS
+    from ...model.wind.soundings import read_soundings
+
+    if component not in COMPONENTS:
+        raise UnknownNameError("wind component", component, COMPONENTS)
+    if soundings is None:
+        refuse_unused(context, ["site"], "without --soundings: the shipped tables are of Cape Canaveral")
+        return shipped_statistics(period, component, edition=edition, top=top)
+    refuse_unused(context, ["period", "edition"], "with --soundings, whose days the statistics are of")
+    read = read_soundings(soundings, drop_incomplete=True)
+    if read.dropped:
+        console.print(f"{read.dropped} incomplete profiles left out", style="dim")
+    found = getattr(read.statistics(soundings.stem, site), component)
+    return found.between(-math.inf, top) if given(context, "top") else found
+
+
+def _statistics_of(
+    context: typer.Context,
+    shaping_filter: ShapingFilter,
+    period: str,
+    component: str,
+    edition: str,
+    top: float,
+    soundings: Path | None,
+):
+    """Return the statistics that the options name, and where they are silent those that the filter was fitted to."""
+    from ...model.wind.range_reference import EDITIONS
+
+    origin = shaping_filter.origin
+    if origin is not None:
+        component = component if given(context, "component") else origin.component
+        period = period if given(context, "period") else origin.period
+        edition = edition if given(context, "edition") else origin.edition
+        if soundings is None and edition not in EDITIONS:
+            raise DataError(
+                f"filter '{shaping_filter.name}' was fitted to {origin}; give --soundings, or --period and "
+                "--edition of a shipped table"
+            )
+    return _statistics(context, period, component, edition, top, soundings)
+
+
+@app.command()
+def apply(
+    context: typer.Context,
+    vehicle: Annotated[str, typer.Argument(help="Vehicle folder; its vehicle.toml is changed.")],
+    component: Component,
+    azimuth: Annotated[
+        float | None,
+        typer.Option(help="Of the flight, deg from north towards east; construction.toml's without it."),
+    ] = None,
+    sign: Annotated[
+        int, typer.Option(help="1: +Y is the component's positive direction, east or north; -1: west or south.")
+    ] = 1,
+    period: Period = "march",
+    edition: Edition = "1983",
+    soundings: Soundings = None,
+    site: Annotated[str | None, typer.Option(help="Of the soundings.")] = None,
+) -> None:
+    """Give a vehicle a wind: filter, mean, standard deviation and record together."""
+    from ...model.vehicle.shipped import built_in_vehicles
+    from ..solvers.least_squares import FitOptions
+    from ..wind.apply import apply_wind, flight_azimuth
+    from ..wind.fitting.progress import fit_progress
+
+    folder = Path(vehicle)
+    if not folder.is_dir() and vehicle in built_in_vehicles():
+        raise OutputFolderError(
+            f"'{vehicle}' ships with ascentwind; make a copy with 'ascentwind new-vehicle DIR --from {vehicle}'"
+        )
+    if soundings is not None and site is None:
+        raise DataError("soundings do not say where they were taken; give --site")
+    across = flight_azimuth(folder, azimuth)
+    s = _statistics(context, period, component, edition, TOP, soundings, site)
+    where = f"--soundings {soundings.name} --site '{site}'" if soundings else f"--period {period} --edition {edition}"
+    command = (
+        f"ascentwind wind apply --component {component} --azimuth {math.degrees(across):.9g} --sign {sign} {where}"
+    )
+    limit = FitOptions().time_limit
+    with fit_progress(console, f"filter for {s.name}", limit) as progress:
+        applied = apply_wind(folder, s, across, sign, command, FitOptions(progress=progress))
+    share = applied.record.share_across
+    for line in (
+        f"{s.name}: filter within {applied.fit.rms_error:.3g} m²/s² rms",
+        f"{', '.join(path.name for path in applied.files)} written in {folder}",
+        f"no longer used: {', '.join(applied.unused)}" if applied.unused else None,
+        f"{share:.0%} of the component is across a path of azimuth {math.degrees(across):g}°; the whole of it is taken",
+        f"the vehicle's title is still '{applied.title}'",
+    ):
+        if line:
+            console.print(line, soft_wrap=True, highlight=False, markup=False)
+
+
+@app.command()
+def stats(
+    context: typer.Context,
+    period: Period = "march",
+    component: Component = "zonal",
+    edition: Edition = "1983",
+    top: Top = 16000.0,
+    soundings: Soundings = None,
+) -> None:
+    """Mean, standard deviation with its 90 % interval, and correlation with the level below."""
+    import numpy as np
+
+    from ..wind.fitting.intervals import covariance_interval
+
+    s = _statistics(context, period, component, edition, top, soundings)
+    low, high = covariance_interval(s.covariance, s.independent_samples)
+    table = Table(title=f"{s.name}, {s.independent_samples:.0f} independent samples", caption=s.source)
+    for column in ("altitude, m", "mean, m/s", "σ, m/s", "90 % interval", "correlation with the level below"):
+        table.add_column(column, justify="right")
+    for i, h in enumerate(s.altitude):
+        below = f"{s.correlation[i, i - 1]:.3f}" if i else ""
+        interval = f"{np.sqrt(low[i, i]):.2f} - {np.sqrt(high[i, i]):.2f}"
+        table.add_row(f"{h:g}", f"{s.mean[i]:.2f}", f"{s.standard_deviation[i]:.2f}", interval, below)
+    console.print(table)
+
+
+@app.command()
+def fit(
+    context: typer.Context,
+    period: Period = "march",
+    component: Component = "zonal",
+    edition: Edition = "1983",
+    top: Top = 16000.0,
+    soundings: Soundings = None,
+    method: Annotated[
+        str, typer.Option(help="state-space, constrained-response, impulse-response, ...")
+    ] = "state-space",
+    order: Annotated[int | None, typer.Option(help="Number of states; 3 where the method allows it.")] = None,
+    noises: Annotated[int, typer.Option(help="White noises that drive the filter; state-space only.")] = 1,
+    time_limit: Annotated[float, typer.Option(help="Seconds.")] = 60.0,
+    out: Annotated[Path, typer.Option(help="File for the filter.")] = Path("wind_filter.json"),
+) -> None:
+    """Synthesise a filter by any method and write it; 'ascentwind wind apply' puts a whole wind into a vehicle."""
+    from dataclasses import replace
+
+    from ...model.wind.filter_file import filter_text
+    from ..present.files import prepare_folder, write_whole
+    from ..solvers.least_squares import FitOptions
+    from ..wind.fitting.progress import fit_progress
+    from ..wind.synthesis.result import SynthesisError
+    from ..wind.synthesis.synthesise import synthesise
+
+    if noises != 1 and method != "state-space":
+        raise SynthesisError(f"method '{method}' makes filters of one noise; take --method state-space")
+    if method == "linear-regression":
+        refuse_unused(context, ["time_limit"], "by linear regression, which optimises nothing")
+    settings = {"noises": noises} if noises != 1 else {}
+    prepare_folder(out.parent)
+    s = _statistics(context, period, component, edition, top, soundings)
+    with fit_progress(console, f"{method} for {s.name}", time_limit) as progress:
+        result = synthesise(s, method, order, FitOptions(time_limit=time_limit, progress=progress), **settings)
+    made = result.shaping_filter
+    command = f"ascentwind wind fit --method {method} --order {made.order} --noises {made.noise_count}" + (
+        f" --period {period} --component {component} --edition {edition} --top {top:g}"
+        if soundings is None
+        else f" --soundings {soundings.name} --component {component} --top {s.altitude[-1]:g}"
+    )
+    made = replace(made, source=f"{made.source}; written by '{command}'")
+    write_whole(out, lambda p: p.write_text(filter_text(made), encoding="utf-8"))
+    state = "converged" if result.converged else f"NOT converged: {result.message}"
+    console.print(
+        f"{method}, order {result.shaping_filter.order}, {state} in {result.seconds:.1f} s: "
+        f"{result.rms_error:.3g} m²/s² rms, {100 * result.share_inside():.1f} % inside the 90 % interval; "
+        f"written to {out}",
+        soft_wrap=True,
+    )
+
+
+@app.command()
+def check(
+    context: typer.Context,
+    filter_file: Annotated[Path, typer.Argument(help="Filter written by 'ascentwind wind fit'.")],
+    period: Period = "march",
+    component: Component = "zonal",
+    edition: Edition = "1983",
+    top: Top = 16000.0,
+    soundings: Soundings = None,
+    profiles: Annotated[int, typer.Option(help="Simulated profiles.")] = 5000,
+) -> None:
+    """Hold a filter against data: covariances by the adjoint, intervals, poles, and an ensemble of profiles."""
+    from ...model.wind.filter_file import read_filter
+    from ..wind.verification import ensemble_share_inside, verify
+
+    shaping_filter = read_filter(filter_file)
+    s = _statistics_of(context, shaping_filter, period, component, edition, top, soundings)
+    v = verify(shaping_filter, s)
+    share = ensemble_share_inside(shaping_filter, v.covariance, s.altitude, profiles)
+    table = Table("what", "found", title=f"{shaping_filter.name} against {s.name}")
+    table.add_row("rms error of the covariances", f"{v.rms_error:.3g} m²/s²")
+    table.add_row("inside the 90 % interval of the data", f"{100 * v.share_inside:.1f} %")
+    table.add_row("largest real part of a frozen pole", f"{v.largest_pole:.3g} 1/m")
+    table.add_row("largest over smallest state", f"{v.state_ratio:.3g}")
+    table.add_row(f"inside the 99 % band of {profiles} profiles", f"{100 * share:.1f} %")
+    console.print(table)
+
+
+@app.command()
+def plot(
+    context: typer.Context,
+    filter_file: Annotated[Path, typer.Argument(help="Filter written by 'ascentwind wind fit'.")],
+    period: Period = "march",
+    component: Component = "zonal",
+    edition: Edition = "1983",
+    top: Top = 16000.0,
+    soundings: Soundings = None,
+    vehicle: Annotated[str, typer.Option(help="Whose trajectory makes flight time of altitude.")] = "as504",
+    out: Out = Path("wind-figures"),
+) -> None:
+    """Figures after the report's 3-7 to 3-16 and A1."""
+    import numpy as np
+
+    from ...model.vehicle.reader import load_vehicle
+    from ...model.vehicle.shipped import find_vehicle
+    from ...model.wind.filter_file import read_filter
+    from ..present.files import prepare_folder
+    from ..present.style import write_figure
+    from ..wind.figures import coefficient_figure, covariance_figure, deviation_figure, interval_figure
+    from ..wind.fitting.analytic_fits import fit_deviation
+    from ..wind.verification import verify
+
+    prepare_folder(out)
+    shaping_filter = read_filter(filter_file)
+    s = _statistics_of(context, shaping_filter, period, component, edition, top, soundings)
+    loaded = load_vehicle(find_vehicle(vehicle))
+    time = np.linspace(loaded.start, loaded.end, 1000)
+    altitude = loaded.tables["altitude"].polynomial(time)
+    keep = altitude <= shaping_filter.altitude[-1]
+    covariance = verify(shaping_filter, s).covariance
+    figures = {
+        "filter_coefficients": coefficient_figure(shaping_filter, time[keep], altitude[keep]),
+        "covariances": covariance_figure(s, covariance, s.name),
+        "interval_9km": interval_figure(s, covariance),
+        "standard_deviation": deviation_figure(s, fit_deviation(s.altitude[1:], s.standard_deviation[1:])),
+    }
+    written = [p for name, figure in figures.items() for p in write_figure(figure, out, name)]
+    console.print(f"{len(written)} files in {out}: {', '.join(p.name for p in written)}", soft_wrap=True)
+
+
+@app.command()
+def compare(
+    vehicle: VehicleArgument,
+    time: Annotated[float | None, typer.Option(help="End time, s; greatest dynamic pressure without it.")] = None,
+    response: Annotated[str, typer.Option(help="Response.")] = "bending_moment",
+) -> None:
+    """A response under different winds: months, editions, the closed form, and filters as poor as the report's."""
+    from dataclasses import replace
+
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    from ...model.wind.range_reference import shipped_statistics
+    from ..case.times import time_of_greatest_dynamic_pressure
+    from ..present.style import display, words
+    from ..solvers.least_squares import FitOptions
+    from ..study import Study
+    from ..views.wind_comparison import (
+        CASES,
+        REPORT_ERRORS,
+        TOP,
+        compare_winds,
+        recorded_wind,
+        shipped_winds,
+        stretched_to_error,
+    )
+    from ..wind.fitting.progress import fit_progress
+
+    study = Study.load(vehicle)
+    assert study.vehicle is not None
+    record = recorded_wind(study.vehicle)
+    component = record.origin.component
+    time = time_of_greatest_dynamic_pressure(study.vehicle) if time is None else time
+    limit = FitOptions().time_limit
+    with fit_progress(console, "fitting filters", limit * len(CASES)) as fitting:
+        winds = shipped_winds(component, record.sign, FitOptions(progress=fitting))
+        march, fitted = shipped_statistics(component=component, top=TOP), winds["march, fitted"]
+        for rms in REPORT_ERRORS:
+            poorer = stretched_to_error(fitted.shaping_filter, march, rms)
+            winds[f"march, wrong by {rms:.0f} m²/s² rms"] = replace(fitted, shaping_filter=poorer)
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=console, transient=True) as bar:
+        task = bar.add_task("responses", total=len(winds) + 1)
+        found = compare_winds(study, winds, time, response, progress=lambda: bar.advance(task))
+    factor, unit = display(found[0].unit, [c.deviation for c in found])
+    table = Table(
+        title=f"{words(response).capitalize()} at {time:g} s, {component} wind alone",
+        caption=f"as in the vehicle: {record.origin}; the others: Cape Canaveral, edition 1983 unless named",
+    )
+    for column in ("wind", f"mean, {unit}", f"σ, {unit}", "variance against the first"):
+        table.add_column(column, justify="left" if column == "wind" else "right")
+    for case in found:
+        change = (case.deviation / found[0].deviation) ** 2 - 1
+        mean, sigma = (f"{factor * value:.4g}" for value in (case.mean, case.deviation))
+        table.add_row(case.wind, mean, sigma, f"{100 * change:+.1f} %")
+    console.print(table)

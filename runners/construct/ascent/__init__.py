@@ -1,0 +1,1 @@
+"""The mean flight: the ascent without wind, integrated with located events."""

@@ -1,0 +1,1 @@
+"""The free beam: elements, modes, and modes followed through flight."""

@@ -1,0 +1,1 @@
+"""Mass properties, and the mass along the vehicle."""

@@ -1,0 +1,1 @@
+"""Load relief: gains with the lowest peak load under limits."""

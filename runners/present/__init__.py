@@ -1,0 +1,1 @@
+"""How figures look, files are written whole and tables are printed."""

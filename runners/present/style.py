@@ -1,0 +1,86 @@
+"""Figures after the report's 5-1, 5-6 and 5-7, and families of weighting functions."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from textwrap import fill
+from typing import Any
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.axis import Axis, Tick
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+from matplotlib.ticker import FixedFormatter, FuncFormatter
+from numpy.typing import ArrayLike
+
+from ...model.system.linear_system import COMBINED
+from ...model.system.names import file_name
+from .files import write_whole
+
+# what people read: factor from SI, unit
+DISPLAY = {
+    "rad": (180 / np.pi, "deg"),
+    "m": (1.0, "m"),
+    "m/s": (1.0, "m/s"),
+    "Pa rad": (1e-3 * 180 / np.pi, "kPa deg"),
+    "1": (1.0, "1"),
+}
+NEWTONS = ("N", "N m", "N m/rad")
+PREFIXES = ((1e6, "M"), (1e3, "k"), (1.0, ""))  # of newtons: the first that leaves the largest value at 1 or more
+TITLE_WIDTH = 76  # characters across a figure of 8 inches
+STYLE: dict[Any, Any] = {
+    "figure.figsize": (8.0, 5.0),
+    "figure.dpi": 110,
+    "axes.grid": True,
+    "grid.alpha": 0.3,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "legend.frameon": False,
+    "font.size": 10.5,
+    "svg.hashsalt": "ascentwind",
+}
+COLORS = {"mean": "#444444", "wind": "#1f6fb4", COMBINED: "#c8442c"}
+
+
+def display(unit: str, values: ArrayLike) -> tuple[float, str]:
+    """Return the factor from SI and the unit in which values of a response are shown."""
+    if unit in NEWTONS:
+        largest = float(np.nanmax(np.abs(values)))
+        size, prefix = next((p for p in PREFIXES if largest >= p[0]), PREFIXES[0])
+        return 1 / size, prefix + unit
+    return DISPLAY.get(unit, (1.0, unit))
+
+
+def wrapped(title: str) -> str:
+    """Return a title with its long lines broken, so that they stay on the figure."""
+    return "\n".join(fill(line, TITLE_WIDTH) for line in title.splitlines())
+
+
+def words(name: str) -> str:
+    """Return a name as words: 'bending_moment' becomes 'bending moment'."""
+    return name.replace("_", " ")
+
+
+def write_figure(figure: Figure, folder: Path, name: str) -> list[Path]:
+    """Write a figure as PNG and SVG; a dollar sign in a title or name stays one."""
+    name = file_name(name)
+    _take_dollars_as_written(figure)
+    with rc_context(STYLE):
+        return [
+            write_whole(folder / f"{name}.png", lambda p: figure.savefig(p, dpi=150)),
+            write_whole(folder / f"{name}.svg", lambda p: figure.savefig(p, metadata={"Date": None})),
+        ]
+
+
+def _take_dollars_as_written(figure: Figure) -> None:
+    """Keep titles and names from being read as mathematics, which only the powers of ten on axes are."""
+    axes = [axis for axis in figure.findobj(Axis) if isinstance(axis, Axis)]
+    numbers = set()  # tick labels, and what stands beside them
+    for axis in axes:
+        numbers.add(axis.offsetText)
+        if not isinstance(axis.get_major_formatter(), FixedFormatter | FuncFormatter):
+            numbers |= {label for tick in axis.findobj(Tick) for label in (tick.label1, tick.label2)}
+    for text in figure.findobj(Text):
+        if text not in numbers:
+            text.set_parse_math(False)

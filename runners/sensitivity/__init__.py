@@ -1,0 +1,1 @@
+"""Exact derivatives of statistics by parameters, tables and rows."""

@@ -1,0 +1,100 @@
+"""The time of the peak, between output times: where the derivative of the quantity with respect to t2 vanishes.
+
+At the peak the derivative of the maximum is the derivative at that time held fixed (envelope theorem).
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.optimize import root_scalar
+
+from ...model.errors import TimeRangeError
+from ..case.times import parse_times, seconds
+from ..solvers.time_nodes import beyond
+from ..statistics.larger_side import sign
+
+if TYPE_CHECKING:
+    from ..case.case import Case
+    from .request import Request
+
+SCAN_POINTS = 40
+TIME_TOLERANCE = 1e-6  # s
+
+
+def peak_time(case: Case, request: Request) -> tuple[float, bool]:
+    """Return the time of the largest value of a quantity, of the mean its size, and whether it is an end of the range.
+
+    The range is a vehicle's ``default_times``, or start to end of a system of your own.
+
+    Raises
+    ------
+    TimeRangeError
+        If the system has no end.
+    """
+    times = _range(case)
+    scan = case.response_statistics(times, responses=[request.response])
+    mean, variance = (scan[name].sel(source=request.source).values[:, 0] for name in ("mean", "variance"))
+    best = int(np.argmax([request.sought(float(v), float(m)) for v, m in zip(variance, mean, strict=True)]))
+    low, high = times[max(best - 1, 0)], times[min(best + 1, len(times) - 1)]
+
+    @lru_cache
+    def quantity(time: float) -> tuple[float, float]:
+        pair = request.pair(case, time)
+        on_variance, on_mean = request.factors(pair)
+        if request.quantity == "mean":
+            on_mean *= sign(pair.mean)
+        variance, mean = pair.slopes
+        return request.sought(pair.variance, pair.mean), on_variance * variance + on_mean * mean
+
+    candidates = [times[best]]
+    switches = case.executable.stops(high).times.tolist()
+    edges = [low, *(d for d in switches if low < d < high), high]
+    for a, b in pairwise(edges):
+        a = beyond(case.system, a) if a in switches else a
+        candidates += [t for t in (a, b) if t in edges[1:-1]]
+        if quantity(a)[1] > 0 > quantity(b)[1]:
+            candidates.append(float(root_scalar(lambda t: quantity(t)[1], bracket=(a, b), xtol=TIME_TOLERANCE).root))
+    found = max(candidates, key=lambda t: quantity(t)[0])
+    return found, found in (times[0], times[-1])
+
+
+def _range(case: Case) -> list[float]:
+    start, end = case.system.start, case.system.end
+    if case.vehicle is not None:
+        return [t for t in parse_times(case.vehicle.file.default_times) if start < t <= end]
+    if not np.isfinite(end):
+        raise TimeRangeError(f"system '{case.system.name}' has no end to search for a peak; give a time in seconds")
+    return np.linspace(start, end, SCAN_POINTS + 1)[1:].tolist()
+
+
+def end_time(case: Case, request: Request, time: float | str) -> tuple[float, bool]:
+    """Return an end time, s, that of the peak for 'peak', and whether that is an end of the range searched.
+
+    Raises
+    ------
+    TimeRangeError
+    """
+    if isinstance(time, str):
+        if time != "peak":
+            raise TimeRangeError(f"'{time}' is not a time; give seconds or 'peak'")
+        time, at_limit = peak_time(case, request)
+    else:
+        time, at_limit = seconds(time), False
+    case.checked_times([time])
+    check_end_time(case, time)
+    return time, at_limit
+
+
+def check_end_time(case: Case, time: float) -> None:
+    """Refuse the start of a system.
+
+    Raises
+    ------
+    TimeRangeError
+    """
+    if time <= case.system.start:
+        raise TimeRangeError(f"at its start, {time:g} s, a system has no history to differentiate; choose a later time")

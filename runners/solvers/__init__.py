@@ -1,0 +1,1 @@
+"""From an executable system to arrays: every integrator, and what they share."""

@@ -1,0 +1,162 @@
+"""The covariance equation, forward by SciPy: another road to the same variances.
+
+P' = A P + P A' + B_s B_s', P(t0) = P0_s for each source s, and x' = A x + E u for the mean;
+Var_s[y] = C P C'. Nothing here uses the adjoint or CVODES.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+
+from ...codegen.system.evaluation import MatrixEvaluator
+from ...codegen.system.executable import ExecutableSystem
+from ...codegen.system.functions import state_scales
+from ...model.errors import IntegrationError
+from .step_budget import at_most, check_explicit_steps
+from .time_nodes import interval_before, intervals, time_nodes
+from .typical_sizes import typical_sizes
+
+LARGEST = 1e280  # of scaled covariances and means
+MOST_STEPS = 100_000  # AS-504 takes 32,000 steps of DOP853 at a tolerance of 1e-13
+
+
+@dataclass(frozen=True)
+class CovarianceOptions:
+    """How the covariance equation is integrated.
+
+    Parameters
+    ----------
+    relative_tolerance : float
+        Of every covariance, between 1e-13 and 1e-2.
+    absolute_part : float
+        The absolute tolerance as a part of the relative one, of the sizes that each source gives the states
+        (runners/solvers/typical_sizes.py): one that hardly moves the vehicle gives covariances many orders smaller
+        than the wind's.
+    longest_interval : float
+        Intervals between discontinuities are divided so that none is longer, s.
+    """
+
+    relative_tolerance: float = 1e-9
+    absolute_part: float = 1e-4
+    longest_interval: float = float("inf")
+
+    def __post_init__(self):
+        if not 1e-13 <= self.relative_tolerance <= 1e-2:
+            raise IntegrationError(
+                f"a relative tolerance of {self.relative_tolerance:g} cannot be met; choose 1e-13 to 1e-2"
+            )
+        if not 0 < self.absolute_part <= 1:
+            raise IntegrationError(f"an absolute part of {self.absolute_part:g} makes no sense; choose up to 1")
+
+
+@dataclass(frozen=True, eq=False)
+class CovarianceResult:
+    """Covariances (k, sources, responses, responses) and means (k, responses) at ``times``."""
+
+    times: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+    mean: NDArray[np.float64]
+
+    @property
+    def variance(self) -> NDArray[np.float64]:
+        """Variance by time, response and source, (k, responses, sources)."""
+        return np.einsum("ksrr->krs", self.covariance)
+
+
+def covariance_equation(
+    executable: ExecutableSystem,
+    times: Sequence[float],
+    relative_tolerance: float = 1e-9,
+    progress: Callable[[float], None] | None = None,
+    longest_interval: float = float("inf"),
+    absolute_part: float = 1e-4,
+) -> CovarianceResult:
+    """Integrate covariances of all sources and the mean with SciPy's DOP853.
+
+    Parameters
+    ----------
+    executable : ExecutableSystem
+        With its tables of the mean response filled in.
+    times : sequence of float
+        Increasing, s.
+    relative_tolerance, absolute_part : float
+        As of :class:`CovarianceOptions`.
+    progress : callable, optional
+        Called with each time when it is reached.
+    longest_interval : float
+        Intervals between discontinuities are divided so that none is longer, s.
+
+    Raises
+    ------
+    IntegrationError
+    """
+    system = executable.system
+    n, scale = len(system.states), state_scales(executable.system)
+    sources = [system.noise_columns(source) for source in system.sources]
+    members = np.zeros((len(system.noises), len(sources)))
+    for k, columns in enumerate(sources):
+        members[columns, k] = 1.0
+    start = [
+        system.start_covariance_matrix(source, executable.parameters) / np.outer(scale, scale)
+        for source in system.sources
+    ]
+    sizes = typical_sizes(executable, float(np.max(times)))
+    matrices = MatrixEvaluator(executable, ("A", "B", "E", "inputs"))
+    outputs = MatrixEvaluator(executable, ("C", "G", "inputs"))
+    y = np.concatenate([np.array(start).ravel(), np.zeros(n)])
+    covariances, means = [], []
+    begin = system.start
+    check_explicit_steps(executable, intervals(executable, begin, float(max(times))), MOST_STEPS)
+    for time, node in zip(times, time_nodes(executable, times).tolist(), strict=True):
+        for interval in intervals(executable, begin, node, longest_interval) if node > begin else []:
+
+            def rate(t: float, y: NDArray, low: float = interval.low, high: float = interval.high) -> NDArray:
+                A, B, E, inputs = matrices(t, low, high)
+                A, B = A * scale / scale[:, None], B / scale[:, None]
+                half = A @ y[:-n].reshape(len(sources), n, n)
+                derivative = half + half.transpose(0, 2, 1) + (B * members.T[:, None, :]) @ B.T
+                mean = A @ y[-n:] + (E @ inputs[:, 0]) / scale
+                return np.concatenate([derivative.ravel(), mean])
+
+            size = sizes and sizes.least(interval.begin, interval.end) / scale
+            budgeted = at_most(rate, MOST_STEPS, "t = {:.6g} s")
+            absolute = absolute_part * relative_tolerance * _absolute(size, len(sources), n)
+            with np.errstate(over="ignore", invalid="ignore"):  # growth beyond numbers is told below, with its time
+                solution = solve_ivp(
+                    budgeted, (interval.begin, interval.end), y, method="DOP853", rtol=relative_tolerance, atol=absolute
+                )
+            if np.abs(solution.y[:, -1]).max(initial=0.0) > LARGEST:
+                raise IntegrationError(
+                    f"covariances or the mean leave the range of numbers near {solution.t[-1]:g} s; the system grows "
+                    "without bound (see its roots)"
+                )
+            if not solution.success or not np.isfinite(solution.y[:, -1]).all():
+                raise IntegrationError(
+                    f"the covariance equation stopped between {interval.begin:g} s and {interval.end:g} s: "
+                    f"{solution.message}"
+                )
+            y = solution.y[:, -1]
+        begin, last = node, interval_before(executable, node)
+        C, G, inputs = outputs(begin, last.low, last.high)
+        C = C * scale
+        covariances.append(C @ y[:-n].reshape(len(sources), n, n) @ C.T)
+        means.append(C @ y[-n:] + G @ inputs[:, 0])
+        if progress:
+            progress(float(time))
+    return CovarianceResult(np.asarray(times, float), np.array(covariances), np.array(means))
+
+
+def _absolute(size: NDArray | None, sources: int, n: int) -> NDArray[np.float64]:
+    """Return what absolute tolerances are parts of, for covariances of all sources and the mean, from sizes of states.
+
+    A state that a source does not move stays exactly zero, whatever is allowed.
+    """
+    if size is None:
+        return np.full(sources * n * n + n, 1e-3)
+    covariance = np.einsum("si,sj->sij", size[:-1], size[:-1]).ravel()
+    return np.maximum(np.concatenate([covariance, size[-1]]), 1e-250)

@@ -1,0 +1,117 @@
+"""The mean response to the known inputs, forward, and the tables of it that the noise coefficients need."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from ...codegen.system.executable import ExecutableSystem
+from ...codegen.system.functions import state_scales
+from ...model.equations.assemble import MEAN_TABLES
+from ...model.tables import TableGroup
+from .integration import Integrator, IntegratorOptions
+from .step_budget import naming_fastest_root
+from .time_nodes import intervals
+
+TOLERANCE = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class MeanResponse:
+    """States and outputs of the mean, forward from rest at the start.
+
+    Attributes
+    ----------
+    times : (k,) array
+        s.
+    states : (k, n) array
+    outputs : (k, n_y) array
+    """
+
+    times: NDArray[np.float64]
+    states: NDArray[np.float64]
+    outputs: NDArray[np.float64]
+
+
+def mean_response(
+    executable: ExecutableSystem, times: NDArray[np.float64], relative_tolerance: float = TOLERANCE
+) -> MeanResponse:
+    """Integrate the mean forward.
+
+    Parameters
+    ----------
+    executable : ExecutableSystem
+    times : (k,) array
+        Increasing, the first at the start of the system; between two discontinuities they are equidistant.
+    relative_tolerance : float
+
+    Raises
+    ------
+    IntegrationError
+    """
+    system = executable.system
+    scale = state_scales(system)
+    integrator = Integrator(executable.functions.mean, IntegratorOptions(relative_tolerance=relative_tolerance))
+    states = [np.zeros(len(scale))]
+    outputs: list[NDArray] = []
+    response = executable.functions.response
+    for interval in intervals(executable, float(times[0]), float(times[-1])):
+        inside = times[(times > interval.begin) & (times <= interval.end)]
+        parameters = executable.integrator_parameters(
+            interval.begin, interval.end - interval.begin, interval.low, interval.high
+        )
+        where = f"of the mean response from {interval.begin:g} s to {interval.end:g} s"
+        with naming_fastest_root(executable):
+            scaled, _, _ = integrator.run(states[-1] / scale, parameters, where, inside.size)
+        found = scaled * scale[:, None]
+        at = inside if outputs else np.concatenate([[times[0]], inside])
+        columns = found if outputs else np.concatenate([states[-1][:, None], found], axis=1)
+        mapped = response.map(at.size)
+        y = mapped(
+            at, np.full(at.size, interval.low), np.full(at.size, interval.high),
+            ca.repmat(ca.DM(executable.parameters), 1, at.size), np.full(at.size, executable.address), columns,
+        )  # fmt: skip
+        outputs.append(y.full().T)
+        states.extend(found.T)
+    return MeanResponse(times, np.array(states), np.concatenate(outputs))
+
+
+def with_mean_tables(
+    executable: ExecutableSystem,
+    respond: Callable[[ExecutableSystem, NDArray[np.float64]], MeanResponse] = mean_response,
+) -> ExecutableSystem:
+    """Return the system with its tables of the mean response filled in, if it has any.
+
+    ``respond`` computes the mean at given times: CVODES, or the sweep's own.
+    """
+    system = executable.system
+    at = next(
+        (i for i, g in enumerate(executable.groups) if g.name == "mean" and set(g.names) == set(MEAN_TABLES)), None
+    )
+    if at is None:
+        return executable
+    group = executable.groups[at]
+    mean = respond(executable, group.knots)
+    columns = []
+    for name in group.names:
+        kind, what = MEAN_TABLES[name]
+        if kind == "output":
+            columns.append(mean.outputs[:, system.output_index(what)])
+        else:
+            columns.append(mean.states[:, system.state_names.index(what)])
+    filled = mean_splines(group, np.stack(columns, axis=1), system.discontinuities)
+    return executable.with_numbers(groups=(*executable.groups[:at], filled, *executable.groups[at + 1 :]))
+
+
+def mean_splines(group: TableGroup, values: NDArray[np.float64], discontinuities: tuple[float, ...]) -> TableGroup:
+    """Return the group with values at its knots, interpolated between discontinuities, where the mean has corners."""
+    knots = group.knots
+    edges = [0, *(int(np.argmin(np.abs(knots - d))) for d in discontinuities), knots.size - 1]
+    pieces = [np.moveaxis(CubicSpline(knots[a : b + 1], values[a : b + 1]).c[::-1], 0, 1) for a, b in pairwise(edges)]
+    return replace(group, coefficients=np.concatenate(pieces))

@@ -1,0 +1,364 @@
+"""All end times in one pass: the generated sweep integrator alone, with weighting functions, and in batches."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ...codegen.sweep.compiled import CompiledSweep, Segments, compiled_sweep
+from ...codegen.system.executable import ExecutableSystem, InterpreterWarning
+from ...codegen.toolchain.cache import CacheError
+from ...codegen.toolchain.interruption import Workers
+from ...codegen.toolchain.library import NoCompilerError
+from ...model.errors import AscentwindError, IntegrationError, TimeRangeError
+from ...model.system.linear_system import LinearSystem
+from .cores import available_cores
+from .mean_response import MeanResponse, with_mean_tables
+from .step_budget import naming_fastest_root
+from .time_nodes import Interval, intervals, on_flight, time_nodes
+from .typical_sizes import misjudged, sizes_of_sweep
+
+LONGEST_SEGMENT = 1.0  # s; weights of the error control are renewed and the Gramians stay well scaled
+LEAST_TOLERANCE, LARGEST_TOLERANCE = 1e-12, 1e-2
+
+
+@dataclass(frozen=True)
+class SweepOptions:
+    """How the sweep integrates.
+
+    Parameters
+    ----------
+    relative_tolerance : float
+        Of every standard deviation, between 1e-12 and 1e-2.
+    longest_interval : float
+        Flight is looked at in pieces no longer than this, s.
+    """
+
+    relative_tolerance: float = 1e-7
+    longest_interval: float = LONGEST_SEGMENT
+
+    def __post_init__(self):
+        if not LEAST_TOLERANCE <= self.relative_tolerance <= LARGEST_TOLERANCE:
+            raise IntegrationError(
+                f"a relative tolerance of {self.relative_tolerance:g} cannot be met; choose {LEAST_TOLERANCE:g} to "
+                f"{LARGEST_TOLERANCE:g}"
+            )
+
+
+def sweep_of(executable: ExecutableSystem) -> CompiledSweep:
+    """Return the compiled sweep of a system, the same one for every study of it.
+
+    Raises
+    ------
+    NoCompilerError
+        Without a compiler, or for a system that is not to be compiled.
+    CompilerError, CacheError
+    """
+    if not executable.may_compile:
+        raise NoCompilerError(
+            f"'{executable.system.name}' was loaded with compile=False, and the sweep exists as compiled code only; "
+            "use engine='cvodes', or load it without compile=False"
+        )
+    return _sweep_of(executable.system)
+
+
+_sweep_of = lru_cache(maxsize=16)(compiled_sweep)
+
+
+def available_sweep(executable: ExecutableSystem) -> CompiledSweep | None:
+    """Return the compiled sweep of a system; None where it is interpreted, or the cache cannot take the sweep.
+
+    Warns
+    -----
+    InterpreterWarning
+        Of the second.
+    """
+    if executable.shared_library is None:
+        return None
+    try:
+        return sweep_of(executable)
+    except CacheError as error:
+        warnings.warn(InterpreterWarning(f"CVODES takes the place of the sweep: {error}"), stacklevel=3)
+        return None
+
+
+@dataclass(frozen=True, eq=False)
+class WeightingFunctions:
+    """The adjoint of every response and end time at the ends of the segments, from the backward sweep.
+
+    Attributes
+    ----------
+    times : (m,) array
+        s.
+    noise : (k, m, responses, noises) array
+        g(t2, t) = B' lambda for each end time; zero after the end time.
+    inputs : (k, m, responses, inputs) array
+        E' lambda, without the delta that G puts at t = t2.
+    """
+
+    times: NDArray[np.float64]
+    noise: NDArray[np.float64]
+    inputs: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class SweepResult:
+    """Statistics of all responses at all end times.
+
+    Attributes
+    ----------
+    times : (k,) array
+        End times, s.
+    covariance : (k, sources, responses, responses) array
+        Between the responses, each source by itself.
+    mean : (k, responses) array
+    error_estimate : (k, sources, responses) array
+        Relative error of the standard deviation, from the embedded formulas.
+    counters : dict
+        Steps, rejected steps, evaluations of the state matrix.
+    weighting : WeightingFunctions or None
+    """
+
+    times: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+    mean: NDArray[np.float64]
+    error_estimate: NDArray[np.float64]
+    counters: dict[str, int]
+    weighting: WeightingFunctions | None = None
+
+    @property
+    def variance(self) -> NDArray[np.float64]:
+        """Variance by end time, response and source, (k, responses, sources)."""
+        return np.einsum("ksrr->krs", self.covariance)
+
+
+class BatchError(IntegrationError):
+    """Some sets of a batch failed.
+
+    Attributes
+    ----------
+    failed : dict of int to AscentwindError
+        By number of the set.
+    completed : dict of int to SweepResult
+        The others, computed to the end.
+    """
+
+    def __init__(self, failed: dict[int, AscentwindError], completed: dict[int, SweepResult]):
+        self.failed, self.completed = failed, completed
+        first = min(failed)
+        super().__init__(
+            f"parameter set {first}: {failed[first]} ({len(failed)} of {len(failed) + len(completed)} sets failed; "
+            "'completed' of this error holds the results of the others)"
+        )
+
+
+def sweep(
+    engine: CompiledSweep,
+    executable: ExecutableSystem,
+    times: ArrayLike,
+    *,
+    relative_tolerance: float = 1e-6,
+    longest_interval: float = LONGEST_SEGMENT,
+    weighting_spacing: float | None = None,
+    responses: Sequence[str] | None = None,
+) -> SweepResult:
+    """Sweep once over the flight for all end times.
+
+    Parameters
+    ----------
+    engine : CompiledSweep
+    executable : ExecutableSystem
+        Numbers: parameters, and tables with those of the mean response filled in.
+    times : (k,) array
+        End times, increasing, from the start on, s. One that falls on a discontinuity is taken from the left.
+    relative_tolerance : float
+        Of every standard deviation, between 1e-12 and 1e-2.
+    longest_interval : float
+        Flight is looked at in pieces no longer than this, s.
+    weighting_spacing : float, optional
+        Keep the weighting functions at points at most this many seconds apart.
+    responses : sequence of str, optional
+        Those wanted; all are computed, and only these are refused where white noise reaches them directly.
+
+    Raises
+    ------
+    TimeRangeError, DirectNoiseError, IntegrationError, DataError
+    """
+    system, ends = engine.system, check_times(engine.system, times)
+    SweepOptions(relative_tolerance)
+    system.refuse_direct_noise(system.output_names if responses is None else responses)
+    longest = min(LONGEST_SEGMENT, longest_interval, weighting_spacing or LONGEST_SEGMENT)
+    nodes = time_nodes(executable, ends)
+    # an end time at the start needs no integration, only a segment to read it in
+    last = nodes[-1] if nodes[-1] > system.start else min(system.end, system.start + longest)
+    segments = flight_segments(executable, (*np.unique(nodes[nodes < last]).tolist(), float(last)), longest)
+    keep, sizes = weighting_spacing is not None, sizes_of_sweep(executable, float(last))
+    with naming_fastest_root(executable):
+        result = engine.run(executable, segments, relative_tolerance, sizes, transition=keep)
+        if misjudged(sizes, result.covariance):
+            sizes = sizes_of_sweep(executable, float(last), trust=False)
+            result = engine.run(executable, segments, relative_tolerance, sizes, transition=keep)
+    at = np.where(nodes > system.start, np.searchsorted(segments.end, nodes), -1)
+    found = result.covariance[at], result.mean[at], result.error[at]
+    if at[0] < 0:
+        for array, value in zip(found, _at_start(executable, segments), strict=True):
+            array[at < 0] = value
+    weighting = None
+    if result.transition is not None:
+        weighting = _weighting_functions(executable, segments, at, result.transition)
+    return SweepResult(ends, *found, result.counters, weighting)
+
+
+def _at_start(
+    executable: ExecutableSystem, segments: Segments
+) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    """Return covariances, mean and their error before any noise has acted."""
+    system = executable.system
+    matrices = executable.matrices(segments.start, segments.low[0], segments.high[0])
+    covariances = [system.start_covariance_matrix(source, executable.parameters) for source in system.sources]
+    covariance = np.array([matrices["C"] @ P @ matrices["C"].T for P in covariances])
+    return covariance, (matrices["G"] @ matrices["inputs"])[:, 0], 0.0
+
+
+def with_sweep_mean_tables(
+    engine: CompiledSweep, executable: ExecutableSystem, relative_tolerance: float = 1e-9
+) -> ExecutableSystem:
+    """Return the system with its tables of the mean response filled in by the sweep's own forward mean."""
+
+    def mean(of: ExecutableSystem, times: NDArray[np.float64]) -> MeanResponse:
+        pieces = intervals(of, float(times[0]), float(times[-1]))
+        which = np.searchsorted([p.end for p in pieces], times[1:])
+        low, high = (np.array([getattr(p, side) for p in pieces])[which] for side in ("low", "high"))
+        segments = Segments(float(times[0]), np.ascontiguousarray(times[1:]), low, high)
+        with naming_fastest_root(of):
+            states, outputs, _ = engine.mean_history(of, segments, relative_tolerance)
+        return MeanResponse(times, states, outputs)
+
+    return with_mean_tables(executable, mean)
+
+
+def batch(
+    engine: CompiledSweep,
+    executable: ExecutableSystem,
+    parameter_sets: Sequence[NDArray[np.float64]] | NDArray[np.float64],
+    times: ArrayLike,
+    *,
+    relative_tolerance: float = 1e-4,
+    threads: int | None = None,
+) -> list[SweepResult]:
+    """Sweep many parameter sets, one after another on each of several threads.
+
+    Parameters
+    ----------
+    engine : CompiledSweep
+    executable : ExecutableSystem
+        Tables common to all sets; those of the mean response are computed anew for each set.
+    parameter_sets : (n, parameters) array or sequence
+    times, relative_tolerance
+        As for ``sweep``; the mean tables are made at a hundredth of the tolerance.
+    threads : int, optional
+        All cores by default.
+
+    Raises
+    ------
+    IntegrationError
+        If more threads are asked for than there are cores.
+    BatchError
+        If a set fails; it holds the results of the others.
+    """
+    cores = available_cores()
+    threads = cores if threads is None else threads
+    if not 1 <= threads <= cores:
+        raise IntegrationError(f"{threads} threads were asked for and there are {cores} cores; choose 1 to {cores}")
+
+    def one(values: NDArray[np.float64]) -> SweepResult | AscentwindError:
+        try:
+            member = executable.with_numbers(parameters=np.asarray(values, float))
+            member = with_sweep_mean_tables(engine, member, 1e-2 * relative_tolerance)
+            return sweep(engine, member, times, relative_tolerance=relative_tolerance)
+        except AscentwindError as error:
+            return error
+
+    with Workers(threads) as pool:
+        found = list(pool.map(one, parameter_sets))
+    completed = {k: member for k, member in enumerate(found) if isinstance(member, SweepResult)}
+    if len(completed) < len(found):
+        raise BatchError({k: e for k, e in enumerate(found) if isinstance(e, AscentwindError)}, completed)
+    return list(completed.values())
+
+
+def check_times(system: LinearSystem, times: ArrayLike) -> NDArray[np.float64]:
+    """Return end times as an array.
+
+    Raises
+    ------
+    TimeRangeError
+        If there is none, or one is off the flight, not finite, or not after the one before.
+    """
+    ends = np.atleast_1d(np.asarray(times, dtype=float))
+    if ends.ndim != 1 or ends.size == 0:
+        raise TimeRangeError("the sweep needs at least one end time")
+    inside = on_flight(system, ends)
+    if not inside.all():
+        raise TimeRangeError(
+            f"end time {ends[np.argmin(inside)]:g} s is off the flight of '{system.name}'; choose times from "
+            f"{system.start:g} s to {system.end:g} s"
+        )
+    if not (np.diff(ends) > 0).all():
+        raise TimeRangeError(f"end times must increase; look after {ends[np.argmin(np.diff(ends) > 0)]:g} s")
+    return ends
+
+
+def flight_segments(executable: ExecutableSystem, end_times: tuple[float, ...], longest: float) -> Segments:
+    """Cut the flight at end times and discontinuities into segments no longer than ``longest`` seconds."""
+    start = executable.system.start
+    return _segments(start, tuple(intervals(executable, start, end_times[-1])), end_times, longest)
+
+
+@lru_cache(maxsize=16)
+def _segments(
+    start: float, pieces_of_flight: tuple[Interval, ...], end_times: tuple[float, ...], longest: float
+) -> Segments:
+    """Cut intervals at end times; kept, because the members of a batch often ask for the same."""
+    times = np.array(end_times)
+    ends, low, high = [], [], []
+    for interval in pieces_of_flight:
+        inside = times[(times > interval.begin) & (times < interval.end)]
+        marks = np.concatenate([[interval.begin], inside, [interval.end]])
+        for a, b in pairwise(marks):
+            pieces = max(1, int(np.ceil((b - a) / longest - 1e-9)))
+            ends.append(np.append(np.linspace(a, b, pieces + 1)[1:-1], b))
+            low.append(np.full(pieces, interval.low))
+            high.append(np.full(pieces, interval.high))
+    return Segments(start, np.concatenate(ends), np.concatenate(low), np.concatenate(high))
+
+
+def _weighting_functions(
+    executable: ExecutableSystem, segments: Segments, at: NDArray[np.intp], transition: NDArray[np.float64]
+) -> WeightingFunctions:
+    """Run all adjoints backward over the segments; a column joins the block at its end time."""
+    system = executable.system
+    n, r, k, m = len(system.states), len(system.outputs), at.size, segments.end.size + 1
+    times = np.concatenate([[segments.start], segments.end])
+    noise = np.zeros((k, m, r, len(system.noises)))
+    inputs = np.zeros((k, m, r, len(system.input_names)))
+    rows = np.zeros((k, r, n))
+    joins = {int(segment): int(np.argmax(at == segment)) for segment in at}  # the first of the ends of a segment
+    first = k
+    for point in range(m - 1, -1, -1):
+        segment = max(point - 1, 0)  # a point belongs to the segment that it ends: the left side of a jump
+        matrices = executable.matrices(float(times[point]), segments.low[segment], segments.high[segment])
+        if point < m - 1:
+            rows[first:] = rows[first:] @ transition[point]
+        if point - 1 in joins:
+            rows[joins[point - 1] : first] = matrices["C"]
+            first = joins[point - 1]
+        noise[first:, point] = rows[first:] @ matrices["B"]
+        inputs[first:, point] = rows[first:] @ matrices["E"]
+    return WeightingFunctions(times, noise, inputs)

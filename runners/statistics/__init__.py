@@ -1,0 +1,1 @@
+"""Response statistics: engines, results, weighting functions, peaks, agreement and tolerance."""

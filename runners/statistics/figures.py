@@ -1,0 +1,136 @@
+"""Figures of response statistics, weighting functions, sample paths and tolerances."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import xarray as xr
+from matplotlib import rc_context
+from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
+
+from ...model.system.linear_system import COMBINED
+from ..present.style import COLORS, STYLE, display, words, wrapped
+from .larger_side import LABEL, SIGMAS, sign
+from .peaks import peaks
+from .results import ResponseStatistics
+from .tolerance import Measurement, Pace
+
+
+def response_figure(statistics: ResponseStatistics, response: str, title: str) -> Figure:
+    """Return the mean, and the side of the peak of |mean| + 3 sigma from the first source and from all, over time."""
+    part = statistics.sel(response=response)
+    (peak,) = peaks(statistics.sel(response=[response]))
+    factor, unit = display(peak.unit, peak.value)
+    first = str(statistics["source"].values[0])
+    time = statistics["time"].values
+    toward = part["mean"] + sign(peak.mean) * SIGMAS * part["std"]
+    with rc_context(STYLE):
+        figure = Figure(layout="constrained")
+        axes = figure.subplots()
+        curves = (
+            ("mean", part["mean"].sel(source=COMBINED), "mean", "-"),
+            ("wind", toward.sel(source=first), f"{peak.side}, {words(first)} alone", "-"),
+            (COMBINED, toward.sel(source=COMBINED), f"{peak.side}, all sources", "--"),
+        )
+        marker = "o" if time.size < 3 else None
+        mean, sigma = part["mean"].sel(source=COMBINED), part["std"].sel(source=COMBINED)
+        axes.fill_between(
+            time, factor * (mean - 3 * sigma), factor * (mean + 3 * sigma),
+            color=COLORS[COMBINED], alpha=0.08, lw=0, label="mean ± 3σ, all sources",
+        )  # fmt: skip
+        for color, values, label, line in curves:
+            axes.plot(time, factor * values, line, color=COLORS[color], label=label, lw=2, marker=marker)
+        axes.annotate(
+            f"{LABEL}: {factor * peak.value:.3g} {unit} at {peak.time:g} s",
+            (peak.time, factor * sign(peak.mean) * peak.value),
+            xytext=(12, 4 * sign(peak.mean)),
+            textcoords="offset points",
+            color=COLORS[COMBINED],
+        )
+        axes.axhline(0, color="black", lw=0.6)
+        axes.margins(y=0.12)
+        axes.set(xlabel="flight time (s)", ylabel=f"{words(response)} ({unit})", title=wrapped(title))
+        axes.legend()
+    return figure
+
+
+def weighting_figure(families: Sequence[xr.Dataset], response: str, unit: str, title: str) -> Figure:
+    """Return the weighting functions from the wind to one response for several end times t2."""
+    factor, shown = display(unit, [np.abs(f["input_weighting"].sel(response=response)).max() for f in families])
+    latest = max(f.attrs["t2_s"] for f in families)
+    first = max(min(float(f["t"].min()) for f in families), latest - 45)
+    with rc_context(STYLE):
+        figure = Figure(figsize=(8.0, 1.6 * len(families) + 1.4), layout="constrained")
+        panels = figure.subplots(len(families), sharex=True, sharey=True, squeeze=False)
+        for family, axes in zip(families, panels[:, 0], strict=True):
+            values = family["input_weighting"].sel(response=response).isel(input=0)
+            axes.plot(family["t"], factor * values, color=COLORS["wind"], lw=1.2)
+            axes.axhline(0, color="black", lw=0.6)
+            axes.text(0.01, 0.86, f"t₂ = {family.attrs['t2_s']:g} s", transform=axes.transAxes, weight="bold")
+        panels[0, 0].set(xlim=(first, latest + 1))
+        panels[-1, 0].set(xlabel="time of the wind impulse t (s)")
+        figure.supylabel(f"g(t₂, t): {words(response)} at t₂ ({shown} per m/s · s)")
+        figure.suptitle(wrapped(title))
+    return figure
+
+
+def sample_path_figure(ensemble: ResponseStatistics, statistics: ResponseStatistics, title: str) -> Figure:
+    """Return the sample paths of an ensemble within mean and mean ± 3 sigma computed without it."""
+    names = [str(name) for name in ensemble["response"].values]
+    with rc_context(STYLE):
+        figure = Figure(figsize=(8.0, 2.6 * len(names) + 1.0), layout="constrained")
+        panels = figure.subplots(len(names), sharex=True, squeeze=False)[:, 0]
+        for name, axes in zip(names, panels, strict=True):
+            factor, unit = display(
+                str(ensemble["unit"].sel(response=name).item()), ensemble["sample_path"].sel(response=name)
+            )
+            paths = factor * ensemble["sample_path"].sel(response=name).values
+            axes.plot(ensemble["t"], paths.T, color="#7f8c9a", lw=0.5, alpha=0.7)
+            part = statistics.sel(response=name, source=COMBINED)
+            for side in (-3, 3):
+                label = "mean ± 3σ, adjoint" if side > 0 else None
+                edge = factor * (part["mean"] + side * part["std"])
+                axes.plot(statistics["time"], edge, "--", color=COLORS[COMBINED], lw=1.8, label=label)
+            axes.plot(statistics["time"], factor * part["mean"], color=COLORS["mean"], lw=1.8, label="mean")
+            axes.set_ylabel(f"{words(name)} ({unit})")
+        panels[0].plot([], [], color="#7f8c9a", label=f"{ensemble.sizes['path']} simulated flights")
+        panels[0].legend(loc="upper left")
+        panels[-1].set_xlabel("flight time (s)")
+        figure.suptitle(title)
+    return figure
+
+
+def tolerance_figure(measurements: Sequence[Measurement], paces: Sequence[Pace], title: str) -> Figure:
+    """Return error and run time against tolerance for each engine, and the steps over flight time with their limit."""
+    with rc_context(STYLE):
+        figure = Figure(figsize=(13.0, 4.8), layout="constrained")
+        error, seconds, steps = figure.subplots(1, 3)
+        for k, label in enumerate(dict.fromkeys(m.engine for m in measurements)):
+            rows = [m for m in measurements if m.engine == label]
+            tolerance = [m.tolerance for m in rows]
+            mark = {"marker": "osD^vP"[k % 6], "ms": 4.5, "color": f"C{k}", "label": label}
+            error.loglog(tolerance, [m.error for m in rows], **mark)
+            seconds.loglog(tolerance, [1e3 * m.seconds for m in rows], **mark)
+        ends = sorted({m.tolerance for m in measurements})
+        error.loglog(ends, ends, ":", color="black", label="error = tolerance")
+        error.set(xlabel="relative tolerance", ylabel="largest relative error of a σ")
+        seconds.set(xlabel="relative tolerance", ylabel="run time (ms)")
+        for axes in (error, seconds):
+            axes.invert_xaxis()
+        seconds.yaxis.set_minor_formatter(NullFormatter())
+        error.legend(fontsize=8.5)
+        edges = [paces[0].begin, *(p.end for p in paces)]
+        for values, label, color in (
+            ([p.newton_step for p in paces], "Adams, Newton", "C0"),
+            ([p.functional_step for p in paces], "Adams, functional", "C1"),
+            ([p.functional_limit for p in paces], "limit of functional iteration, 2 / |root|", "black"),
+        ):
+            line = ":" if color == "black" else "-"
+            steps.stairs([1e3 * v for v in values], edges, baseline=None, label=label, color=color, ls=line, lw=1.8)
+        steps.set(xlabel="flight time (s)", ylabel="mean step of CVODES (ms)")
+        steps.set_ylim(0, 1.35e3 * max(max(p.functional_limit, p.newton_step, p.functional_step) for p in paces))
+        steps.legend(fontsize=8.5)
+        figure.suptitle(title)
+    return figure

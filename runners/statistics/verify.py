@@ -1,0 +1,140 @@
+"""The same statistics by independent roads, held against each other, with a verdict."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..solvers.ensemble import EnsembleOptions, mean_interval, std_interval
+from .engines import ENGINES, Progress, relative_difference
+from .results import ResponseStatistics
+
+if TYPE_CHECKING:
+    from ..case.case import Case
+
+REFERENCE = "cvodes"
+LIMIT = 1e-6  # relative, between engines that only discretise
+SUBSTEP_ERROR = 5e-5  # relative, of an ensemble of infinitely many runs (tests/runners/solvers/test_ensemble.py)
+FALSE_ALARM = 1e-3  # chance that a right ensemble is called wrong, all entries together
+
+
+@dataclass(frozen=True, eq=False)
+class Verification:
+    """What the engines found.
+
+    Attributes
+    ----------
+    statistics : dict of engine to ResponseStatistics
+    differences : dict of engine to (times, responses, sources) array
+        Relative difference of the standard deviation to the reference, for the engines without noise.
+    mean_differences : dict of engine to (times, responses, sources) array
+        Of the mean, relative to its size or the standard deviation, whichever is larger.
+    inside : (times, responses, sources) array of bool
+        Whether the reference's standard deviation lies in the ensemble's confidence interval.
+    mean_inside : (times, responses, sources) array of bool
+    impossible : (times, responses, sources) array of bool
+        Entries outside an interval so wide that a right result would leave it once in a thousand ensembles.
+    """
+
+    statistics: dict[str, ResponseStatistics]
+    differences: dict[str, NDArray[np.float64]]
+    mean_differences: dict[str, NDArray[np.float64]]
+    inside: NDArray[np.bool_]
+    mean_inside: NDArray[np.bool_]
+    impossible: NDArray[np.bool_]
+
+    @property
+    def agree(self) -> bool:
+        return not self.complaints()
+
+    def complaints(self) -> list[str]:
+        """Return what disagrees, a sentence each."""
+        found = []
+        for what, differences in (("standard deviation", self.differences), ("mean", self.mean_differences)):
+            for engine, values in differences.items():
+                worst = np.unravel_index(np.nanargmax(np.where(np.isnan(values), np.inf, values)), values.shape)
+                if not values[worst] <= LIMIT:
+                    found.append(
+                        f"{what} by {ENGINES[engine].label} differs by {values[worst]:.1e} in {self._entry(worst)}; "
+                        f"{LIMIT:g} is allowed"
+                    )
+        if self.impossible.any():
+            worst = tuple(int(i[0]) for i in np.nonzero(self.impossible))
+            found.append(
+                f"{int(self.impossible.sum())} of {self.impossible.size} entries lie outside the ensemble by more than "
+                f"chance allows, the first in {self._entry(worst)}"
+            )
+        return found
+
+    def verdict(self) -> str:
+        """Return one or two sentences for people."""
+        complaints = self.complaints()
+        if complaints:
+            return "The engines DISAGREE: " + "; ".join(complaints) + "."
+        worst = max((float(d.max()) for d in self.differences.values()), default=0.0)
+        names = ", ".join(ENGINES[e].label for e in (REFERENCE, *self.differences))
+        ensemble = self.statistics["ensemble"].attrs
+        return (
+            f"The engines agree: standard deviations by {names} within {worst:.1e}; {self.inside.sum()} of "
+            f"{self.inside.size} lie in the {ensemble['confidence']:.0%} interval of {ensemble['runs']} simulated "
+            f"flights (about {ensemble['confidence'] * self.inside.size:.0f} expected), none beyond chance."
+        )
+
+    def _entry(self, index: tuple) -> str:
+        reference = self.statistics[REFERENCE]
+        k, r, s = index
+        return (
+            f"{reference['response'].values[r]} from {reference['source'].values[s]} at "
+            f"{reference['time'].values[k]:g} s"
+        )
+
+
+def verify(case: Case, times: list[float], ensemble: EnsembleOptions, progress: Progress | None = None) -> Verification:
+    """Compute the statistics with every engine at a tight setting and compare.
+
+    Parameters
+    ----------
+    case : Case
+    times : list of float
+        s.
+    ensemble : EnsembleOptions
+    progress : callable, optional
+
+    Raises
+    ------
+    TimeRangeError, IntegrationError, EnsembleNeedsCompilerError
+    """
+    statistics = {}
+    for name, engine in ENGINES.items():
+        options = ensemble if engine.tight is None else engine.tight
+        statistics[name] = case.response_statistics(times, engine=name, options=options, progress=progress)
+    reference = statistics[REFERENCE]
+    std, mean = reference.std.values, reference.mean.values
+    differences, mean_differences = {}, {}
+    for name, found in statistics.items():
+        if name == REFERENCE or ENGINES[name].tight is None:
+            continue
+        differences[name] = relative_difference(found.std.values, std)
+        size = np.maximum(np.maximum(np.abs(mean), std), np.finfo(float).tiny)
+        mean_differences[name] = np.abs(found.mean.values - mean) / size
+    sampled = statistics["ensemble"]
+    wide = 1 - FALSE_ALARM / (2 * std.size)  # Bonferroni: the chances of all entries, means and deviations, add up
+    in_std = _inside(std, std_interval(sampled.std.values, ensemble.runs, wide))
+    in_mean = _inside(mean, mean_interval(sampled.mean.values, sampled.std.values, ensemble.runs, wide))
+    return Verification(
+        statistics,
+        differences,
+        mean_differences,
+        _inside(std, (sampled["std_low"].values, sampled["std_high"].values)),
+        _inside(mean, (sampled["mean_low"].values, sampled["mean_high"].values)),
+        ~(in_std & in_mean),
+    )
+
+
+def _inside(value: NDArray, interval: tuple[NDArray, NDArray]) -> NDArray[np.bool_]:
+    low, high = interval
+    slack = SUBSTEP_ERROR * np.abs(value)  # where nothing is random the interval is a point
+    return (low - slack <= value) & (value <= high + slack)

@@ -1,0 +1,1 @@
+"""Looking at a study: equations, matrices, moments along the vehicle, winds compared."""

@@ -1,0 +1,164 @@
+"""The bending moment along the vehicle as files and a figure: at one time, over the flight, and where it is largest."""
+
+from __future__ import annotations
+
+import csv
+import io
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import xarray as xr
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ...model.construction.construction_file import CONSTRUCTION_FILE, load_construction
+from ...model.construction.tank_shape import TankShape
+from ...model.equations.station_loads import load_station_loads
+from ...model.errors import TimeRangeError
+from ...model.system.linear_system import COMBINED
+from ...model.vehicle.vehicle import Vehicle
+from ..present.files import write_whole
+from ..present.style import COLORS, STYLE, display, words, write_figure
+from ..statistics.larger_side import LABEL, larger_side
+from .moments_along_vehicle import moments_along_vehicle
+
+if TYPE_CHECKING:
+    from ..study import Study
+
+NAME = "bending_moment_along_vehicle"
+PEAK = "peak"
+COLUMNS = ("time_s", "station_m", "source", "mean", "std", "mean_plus_3sigma")
+
+
+def prepare_along_vehicle(study: Study, text: str) -> float | None:
+    """Return a time in s, or None for 'peak', once it is certain that the moment along the vehicle can be computed.
+
+    Raises
+    ------
+    TimeRangeError, DataError
+    """
+    if study.vehicle is not None:
+        load_station_loads(study.vehicle)
+    if text == PEAK:
+        return None
+    try:
+        time = float(text)
+    except ValueError:
+        raise TimeRangeError(f"'{text}' is not a time; give seconds or '{PEAK}'") from None
+    study.checked_times([time])
+    return time
+
+
+def write_along_vehicle(study: Study, times: list[float], time: float | None, folder: Path) -> list[Path]:
+    """Compute the moment along the vehicle at all times and write NetCDF, CSV and a figure.
+
+    Parameters
+    ----------
+    times : list of float
+        Of the envelope, s.
+    time : float or None
+        Of the section through the vehicle; None takes the time of the largest moment.
+    folder : Path
+        Made and writable.
+    """
+    assert study.vehicle is not None  # moments_along_vehicle needs one
+    found = moments_along_vehicle(study, sorted({*times, *([] if time is None else [time])}))
+    if time is None:
+        largest = _largest(found).max("station")
+        time = float(found["time"].values[int(np.argmax(largest.values))])
+    text = along_csv(found)
+    return [
+        write_whole(folder / f"{NAME}.nc", lambda p: found.to_netcdf(p, engine="scipy")),
+        write_whole(folder / f"{NAME}.csv", lambda p: p.write_text(text, encoding="utf-8")),
+        *write_figure(along_figure(found, time, study.vehicle), folder, NAME),
+    ]
+
+
+def along_csv(found: xr.Dataset) -> str:
+    """Return the moments as tidy CSV, N m."""
+    buffer = io.StringIO()
+    writer = csv.writer(buffer, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    numbers = [np.broadcast_to(found["mean"].values[:, :, None], found["std"].shape)]
+    numbers += [found[name].values for name in COLUMNS[4:]]
+    for k, time in enumerate(found["time"].values):
+        for n, station in enumerate(found["station"].values):
+            for s, source in enumerate(found["source"].values):
+                row = (np.format_float_scientific(values[k, n, s], 9) for values in numbers)
+                writer.writerow([f"{time:.12g}", f"{station:.9g}", source, *row])
+    return buffer.getvalue()
+
+
+def along_figure(found: xr.Dataset, time: float, vehicle: Vehicle) -> Figure:
+    """Return the moment over the stations at a time, its envelope over the flight, and both times and stations."""
+    factor, unit = display("N m", _largest(found).values)
+    panels = 3 if found.sizes["time"] > 1 else 1
+    with rc_context(STYLE):
+        figure = Figure(figsize=(8.5, 1.2 + 3.5 * panels), layout="constrained")
+        outline, *axes = figure.subplots(1 + panels, sharex=True, height_ratios=[0.18, *[1] * panels])
+        _tanks(outline, vehicle.folder)
+        _section(axes[0], found.sel(time=time), factor)
+        axes[0].set_title(f"at {time:g} s", loc="left")
+        if panels > 1:
+            _envelope(axes[1], found, factor)
+            begin, end = found["time"].values[[0, -1]]
+            axes[1].set_title(f"envelope from {begin:g} to {end:g} s", loc="left")
+            mesh = axes[2].pcolormesh(
+                found["station"], found["time"], factor * _largest(found), shading="gouraud", rasterized=True
+            )
+            figure.colorbar(mesh, ax=axes[2], label=f"{LABEL} ({unit})", pad=0.01)
+            axes[2].axhline(time, color="white", lw=0.8, ls=":")
+            axes[2].grid(False)
+            axes[2].set_ylabel("flight time (s)")
+        for panel in axes[:2]:
+            panel.axhline(0, color="black", lw=0.6)
+            panel.set_ylabel(f"bending moment ({unit})")
+            panel.margins(x=0, y=0.2)
+            for n, load in enumerate(vehicle.file.loads):
+                label = None if n else "load station of the outputs"
+                panel.axvline(load.station_m, color="black", lw=0.8, ls=":", label=label)
+            panel.legend(loc="upper center", ncols=4, fontsize=8.5)
+        axes[-1].set_xlabel("vehicle station, forward to the right (m)")
+        figure.suptitle(f"{vehicle.title}\nBending moment along the vehicle, with its answer to slosh")
+    return figure
+
+
+def _tanks(axes: Axes, folder: Path) -> None:
+    """Draw the tanks of a vehicle whose construction is in its folder."""
+    axes.axis("off")
+    if not (folder / CONSTRUCTION_FILE).is_file():
+        return
+    for tank in load_construction(folder).tanks:
+        shape = TankShape.of(tank)
+        station = np.linspace(shape.edges[0], shape.edges[-1], 200)
+        axes.fill_between(station, -shape.radius(station), shape.radius(station), color="grey", alpha=0.45, lw=0)
+        middle = 0.5 * (station[0] + station[-1])
+        axes.text(middle, 0, words(tank.name).replace(" ", "\n"), fontsize=7, ha="center", va="center")
+
+
+def _section(axes: Axes, part: xr.Dataset, factor: float) -> None:
+    mean, station = part["mean"], part["station"]
+    first = str(part["source"].values[0])
+    axes.plot(station, factor * mean, color=COLORS["mean"], lw=2, label="mean")
+    for source, color, line in ((first, COLORS["wind"], "-"), (COMBINED, COLORS[COMBINED], "--")):
+        sigma = part["std"].sel(source=source)
+        label = "all sources" if source == COMBINED else f"{words(source)} alone"
+        axes.plot(station, factor * (mean + 3 * sigma), line, color=color, lw=1.8, label=f"mean ± 3σ, {label}")
+        axes.plot(station, factor * (mean - 3 * sigma), line, color=color, lw=1.8)
+
+
+def _envelope(axes: Axes, found: xr.Dataset, factor: float) -> None:
+    mean, sigma = found["mean"], found["std"].sel(source=COMBINED)
+    high, low = (mean + 3 * sigma).max("time"), (mean - 3 * sigma).min("time")
+    axes.fill_between(found["station"], factor * low, factor * high, color=COLORS[COMBINED], alpha=0.12, lw=0)
+    axes.plot(found["station"], factor * high, color=COLORS[COMBINED], lw=1.8, label="largest mean + 3σ")
+    axes.plot(found["station"], factor * low, "--", color=COLORS[COMBINED], lw=1.8, label="least mean - 3σ")
+    for edge, label in ((mean.max("time"), "largest and least mean"), (mean.min("time"), None)):
+        axes.plot(found["station"], factor * edge, color=COLORS["mean"], lw=1.5, label=label)
+
+
+def _largest(found: xr.Dataset) -> xr.DataArray:
+    """Return |mean| + 3 sigma from all sources, (time, station)."""
+    return larger_side(found["mean"], found["std"].sel(source=COMBINED))

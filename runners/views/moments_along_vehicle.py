@@ -1,0 +1,156 @@
+"""Mean and spread of the bending moment along the whole vehicle, from one run.
+
+At a time the moment of every station is linear in the same few quantities y: M = K y. One run gives their means and,
+source by source, their covariances P; then E[M] = K E[y] and Var[M] = diag(K P K').
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from ...model.equations.load_components import component_columns
+from ...model.equations.noise_loads import noise_load
+from ...model.equations.station_loads import StationLoads, load_station_loads
+from ...model.errors import IntegrationError, UnknownNameError
+from ...model.system.linear_system import COMBINED
+from ...model.vehicle.columns import local_load_columns
+from ...model.vehicle.noise_loads import loading_noises
+from ..case.provenance import provenance
+from ..solvers.time_nodes import interval_before, time_nodes
+
+if TYPE_CHECKING:
+    from ..study import Study
+
+
+def moments_along_vehicle(
+    study: Study,
+    times: Iterable[float],
+    *,
+    slosh_reaction: bool = True,
+    engine: str | None = None,
+    options: object | None = None,
+) -> xr.Dataset:
+    """Return mean, variance, std and mean + 3 sigma of the bending moment over (time, station, source).
+
+    Parameters
+    ----------
+    study : Study
+        Of a vehicle with ``tables.loads_along_vehicle``.
+    times : iterable of float
+        Flight times, s.
+    slosh_reaction : bool
+        Whether the whole vehicle answers slosh. Without, as the report has it, the moment does not vanish at the tail.
+        Here it does not follow the vehicle's option, which is for its outputs.
+    engine : {'sweep', 'covariance'}, optional
+        Those that give covariances; the sweep where something is compiled.
+    options : SweepOptions or CovarianceOptions, optional
+
+    Raises
+    ------
+    DataError, TimeRangeError, DirectNoiseError, IntegrationError
+    """
+    if study.vehicle is None:
+        raise UnknownNameError("vehicle of a system of one's own", study.system.name, [])
+    loads = load_station_loads(study.vehicle)
+    tanks = [tank.name for tank in study.vehicle.slosh]
+    names = list(component_columns(len(study.vehicle.bending), tanks, loading_noises(study.vehicle.file)))
+    components = _with_components(study)
+    if engine is None and options is None:
+        engine = "covariance" if study.executable.shared_library is None else "sweep"
+    found = components.response_statistics(times, responses=names, engine=engine, options=options)
+    if "covariance" not in found:
+        raise IntegrationError(f"engine '{found.attrs['engine']}' gives no covariances; use sweep or covariance")
+    at = found["time"].values
+    rows = station_rows(components, loads, at, slosh_reaction)
+    mean = np.einsum("tnc,tc->tn", rows, found.mean.sel(source=COMBINED).values)
+    variance = np.einsum("tnc,tscd,tnd->tns", rows, found["covariance"].values, rows)
+    variance = np.maximum(variance, 0.0)  # rounding, where every coefficient vanishes
+    std = np.sqrt(variance)
+    dims = ("time", "station", "source")
+    dataset = xr.Dataset(
+        {
+            "mean": (dims[:2], mean),
+            "variance": (dims, variance),
+            "std": (dims, std),
+            "mean_plus_3sigma": (dims, mean[:, :, None] + 3 * std),
+        },
+        {
+            "time": ("time", at, {"units": "s", "long_name": "flight time"}),
+            "station": ("station", loads.station, {"units": "m", "long_name": "vehicle station"}),
+            "forward_of_gimbal": ("station", loads.forward_of_gimbal, {"units": "m"}),
+            "source": found["source"].values,
+        },
+        provenance(study)
+        | {
+            "engine": found.attrs["engine"],
+            "slosh_reaction": str(slosh_reaction).lower(),
+            "noise_loads": study.vehicle.file.options.noise_loads,
+        },
+    )
+    for name in dataset:
+        dataset[name].attrs["units"] = "(N m)^2" if name == "variance" else "N m"
+    return dataset
+
+
+def _with_components(study: Study) -> Study:
+    """Return the study with the quantities that moments are made of as outputs."""
+    vehicle = study.vehicle
+    assert vehicle is not None
+    wanted = dict.fromkeys((*vehicle.file.options.extra_outputs, "load_components"))
+    options = vehicle.file.options.model_copy(update={"extra_outputs": tuple(wanted)})
+    vehicle = replace(vehicle, file=vehicle.file.model_copy(update={"options": options}))
+    made = type(study).from_vehicle(vehicle, compile=study.executable.shared_library is not None)
+    return made.with_parameters({name: p.value for name, p in study.parameters.items()})
+
+
+def station_rows(
+    study: Study, loads: StationLoads, times: NDArray[np.float64], slosh_reaction: bool
+) -> NDArray[np.float64]:
+    """Return K, the coefficient of each component at each station, (times, stations, components)."""
+    assert study.vehicle is not None
+    tanks = [tank.name for tank in study.vehicle.slosh]
+    times = np.array([interval_before(study.executable, node).high for node in time_nodes(study.executable, times)])
+    columns = loads.at(times)
+    zero = np.zeros((times.size, loads.station.size))
+    columns |= {f"slosh_displacement_{tank}": zero for tank in tanks}
+    if not study.vehicle.file.options.local_angle_of_attack:
+        columns |= {name: zero for name, _, _ in local_load_columns(len(study.vehicle.bending))}
+    at = [study.tables(float(time)) for time in times]
+    flight = {name: np.array([tables[name] for tables in at])[:, None] for name in at[0]}
+    if slosh_reaction:
+        columns |= _with_reaction(columns, loads, tanks, flight)
+    file, area = study.vehicle.file, study.parameters["reference_area"].value
+    noises = loading_noises(file)
+    means = flight["mean.angle_of_attack"], flight["mean.engine_angle"]
+    for name, tables in noises.items():
+        columns[f"relative_deviation_{name}"] = noise_load(
+            tables, file.options.noise_loads, columns, flight, area, *means
+        )
+    wanted = component_columns(len(study.vehicle.bending), tanks, noises)
+    return np.stack([columns[c] for c in wanted.values()], axis=2)
+
+
+def _with_reaction(
+    columns: dict[str, NDArray[np.float64]],
+    loads: StationLoads,
+    tanks: list[str],
+    flight: dict[str, NDArray[np.float64]],
+) -> dict[str, NDArray[np.float64]]:
+    """Return the slosh columns with the rigid body's answer, as slosh_reaction of model/equations/loads.py has it."""
+    turning = columns["second_moment"] / flight["moment_of_inertia"]
+    sinking = columns["first_moment"] / flight["mass"]
+    found = {}
+    for tank in tanks:
+        mass, point = flight[f"slosh.{tank}.mass"], flight[f"slosh.{tank}.attach_point"]
+        inertia = mass * (sinking + (point - flight["center_of_gravity"]) * turning)
+        found[f"slosh_{tank}"] = columns[f"slosh_{tank}"] + inertia
+        found[f"slosh_displacement_{tank}"] = (
+            flight["axial_acceleration"] * mass * ((point > loads.forward_of_gimbal) - turning)
+        )
+    return found

@@ -1,0 +1,1 @@
+"""Wind fits: intervals, correlation, verification and figures."""

@@ -1,0 +1,1 @@
+"""What all fits share: grids of altitude, intervals of covariances, poles, progress."""

@@ -1,0 +1,1 @@
+"""Shaping filters from covariances, one file a method."""

@@ -1,0 +1,33 @@
+"""The covariance of the wind filter at the altitude where the flight starts."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ascentwind.model.wind.shaping_filter import ShapingFilter
+from ascentwind.runners.case.wind_start import covariance_at
+
+
+def test_stationary_filter_keeps_its_covariance(as504_closed_form):
+    """The closed-form filter has diag(1, 3, 1) at every altitude; the study starts with it at 10 s (100 m)."""
+    as504 = as504_closed_form
+    shaping_filter = as504.vehicle.wind.shaping_filter
+    for altitude in (3.0, 100.0, 9000.0):
+        np.testing.assert_allclose(covariance_at(shaping_filter, altitude), np.diag([1.0, 3.0, 1.0]), atol=1e-8)
+    first = as504.system.state_names.index("wind_1")
+    start = as504.system.start_covariance_matrix("wind", as504.executable.parameters)
+    np.testing.assert_allclose(start[first : first + 3, first : first + 3], np.diag([1.0, 3.0, 1.0]), atol=1e-8)
+
+
+def test_filter_from_a_known_start_has_its_closed_form():
+    """z' = -z/L + g n from Var 4 at 0 m: Var(h) = g^2 L/2 + (4 - g^2 L/2) exp(-2 h/L)."""
+    length, gain, h = 2000.0, 0.05, np.linspace(0.0, 5000.0, 6)
+    shaping_filter = ShapingFilter(
+        "lag", h, np.full((6, 1, 1), -1 / length), np.full((6, 1, 1), gain), np.ones((6, 1)), np.array([[4.0]])
+    )
+    level = gain**2 * length / 2
+    for altitude in (0.0, 700.0, 4321.0):
+        expected = level + (4.0 - level) * np.exp(-2 * altitude / length)
+        assert covariance_at(shaping_filter, altitude)[0, 0] == pytest.approx(expected, rel=1e-9)
+    assert covariance_at(shaping_filter, -50.0)[0, 0] == 4.0

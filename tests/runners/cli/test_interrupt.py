@@ -1,0 +1,166 @@
+"""Ctrl-C in every command: ended at once, exit code 130, no traceback, the cache and stored results left usable."""
+
+from __future__ import annotations
+
+import os
+import resource
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ascentwind.codegen.toolchain.interruption import Workers, call
+from ascentwind.model.vehicle.shipped import built_in_vehicles
+from ascentwind.runners import IntegratorOptions
+from ascentwind.runners.cli.exit_codes import INTERRUPTED
+from ascentwind.runners.solvers.cores import available_cores
+
+pytestmark = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="reads processor time from /proc")
+
+SLOWEST = 3.0  # s of processor time; it is some 0.05 s, and 2 s where the alarm has to ring
+STARTED = "from ascentwind.runners.cli.entry import main; main()"
+EXAMPLES = Path(__file__).parents[3] / "examples"
+COMMANDS = {
+    "run": ["run", "as504"],
+    "run by CVODES": ["run", "as504", "--engine", "cvodes", "--tolerance", "1e-12"],
+    "run by the covariance equation": ["run", "as504", "--engine", "covariance"],
+    "run by the ensemble": ["run", "as504", "--engine", "ensemble"],
+    "mean": ["mean", "as504"],
+    "sensitivity": ["sensitivity", "as504"],
+    "verify": ["verify", "as504"],
+    "tolerance": ["tolerance", "as504"],
+    "design": ["design", str(built_in_vehicles()["as504"] / "load_relief_design.toml")],
+    "study": ["study", str(EXAMPLES / "as504_dispersion.toml")],
+    "reproduce": ["reproduce", "--out", "page"],
+    "build-vehicle": ["build-vehicle", "as504", "--out", "built", "--figures", "figures"],
+    "equations": ["equations", "as504", "--page", "page.md"],
+    "wind fit": ["wind", "fit"],
+    "inspect": ["inspect", "as504", "--time", "75"],
+    "regenerate": ["regenerate"],
+}
+
+
+def start(arguments: list[str], folder: Path, **environment: str) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, "-c", STARTED, *arguments], cwd=folder, env=os.environ | environment, text=True,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a shell's background job ignores it
+    )  # fmt: skip
+
+
+def processor_seconds(process: subprocess.Popen[str]) -> float:
+    fields = Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def interrupt(process: subprocess.Popen[str]) -> tuple[float, str]:
+    """Send SIGINT; return the processor time until the process has ended, s, and what it printed as errors."""
+    before, used = ended_processes(), processor_seconds(process)
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=60)
+    return ended_processes() - before - used, errors
+
+
+def ended_processes() -> float:
+    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return usage.ru_utime + usage.ru_stime
+
+
+@pytest.mark.parametrize("moment", [0.3, 2.0, 3.5])
+@pytest.mark.parametrize("command", COMMANDS)
+def test_commands_end_at_once(command, moment, tmp_path):
+    process = start(COMMANDS[command], tmp_path)
+    while process.poll() is None and processor_seconds(process) < moment:
+        time.sleep(0.01)
+    if process.poll() is not None:
+        pytest.skip("it had ended before")
+    delay, errors = interrupt(process)
+    assert process.returncode == INTERRUPTED, errors
+    assert "Traceback" not in errors
+    assert "error" not in errors
+    assert delay < SLOWEST
+    assert not [p for p in tmp_path.rglob("*") if p.is_file() and p.name.startswith(".") and p.name != ".lock"]
+
+
+def test_compiler_under_way_is_ended(tmp_path):
+    """The driver starts another process, as compilers do; both end, and the cache serves the next."""
+    script, cache = tmp_path / "slowcc", tmp_path / "cache"
+    script.write_text(
+        '#!/bin/sh\ncase "$*" in *--version*) echo slow 1; exit;; *-E*) cat >/dev/null; exit;; esac\n'
+        f"sleep 600 & echo $! > {tmp_path}/worker\nwait\n"
+    )
+    script.chmod(0o755)
+    process = start(["run", "as504"], tmp_path, CC=str(script), ASCENTWIND_CACHE=str(cache))
+    while not (tmp_path / "worker").exists() or not (tmp_path / "worker").read_text().strip():
+        assert process.poll() is None, process.communicate()
+        time.sleep(0.05)
+    delay, errors = interrupt(process)
+    assert (process.returncode, delay < SLOWEST, "Traceback" in errors) == (INTERRUPTED, True, False)
+    worker = int((tmp_path / "worker").read_text())
+    status = Path(f"/proc/{worker}/status")
+    assert not status.exists() or "zombie" in status.read_text()
+    assert not [p for p in cache.iterdir() if p.is_dir()]
+
+
+def test_interrupted_study_keeps_its_chunks(tmp_path):
+    process = start(COMMANDS["study"], tmp_path)
+    chunks = tmp_path / "as504_dispersion-results" / "chunks"
+    while not list(chunks.glob("0*.nc")):
+        assert process.poll() is None, process.communicate()
+        time.sleep(0.02)
+    delay, errors = interrupt(process)
+    assert (process.returncode, delay < SLOWEST) == (INTERRUPTED, True)
+    assert "run the same command again" in " ".join(errors.split())
+    assert list(chunks.glob("0*.nc"))
+    assert not list(chunks.glob(".*.nc"))
+
+
+def signal_after(seconds: float) -> threading.Timer:
+    timer = threading.Timer(seconds, os.kill, (os.getpid(), signal.SIGINT))
+    timer.start()
+    return timer
+
+
+@pytest.mark.skipif(signal.getsignal(signal.SIGINT) is signal.SIG_IGN, reason="SIGINT is ignored here")
+@pytest.mark.parametrize("engine", ["cvodes", "sweep"])
+def test_library_raises_keyboard_interrupt(as504, engine):
+    """In Python too; CVODES does not take it for a failure of the equations."""
+    options = IntegratorOptions(relative_tolerance=1e-13, method="bdf") if engine == "cvodes" else None
+    as504.response_statistics([20.0], engine=engine)
+    timer = signal_after(0.3)
+    with pytest.raises(KeyboardInterrupt):
+        for _ in range(1000):
+            as504.response_statistics(np.arange(20.0, 140.0), engine=engine, options=options)
+    timer.join()
+    assert as504.response_statistics([20.0], engine=engine).variance.values.min() > 0
+
+
+@pytest.mark.skipif(signal.getsignal(signal.SIGINT) is signal.SIG_IGN, reason="SIGINT is ignored here")
+def test_batch_is_stopped_within_a_sweep(as504):
+    begin, timer = time.process_time(), signal_after(0.5)
+    with pytest.raises(KeyboardInterrupt):
+        as504.batch([{}] * 5000, np.arange(20.0, 140.0))
+    timer.join()
+    assert time.process_time() - begin < 0.5 * available_cores() + SLOWEST
+
+
+def test_flag_reaches_what_the_threads_call():
+    def compiled(flag) -> int:
+        begun.set()
+        while not flag._obj.value:
+            time.sleep(0.001)
+        return -1
+
+    begun = threading.Event()
+    with pytest.raises(ZeroDivisionError), Workers(1) as pool:
+        running, waiting = pool.submit(call, compiled), pool.submit(call, compiled)
+        begun.wait()
+        raise ZeroDivisionError
+    assert waiting.cancelled()
+    with pytest.raises(KeyboardInterrupt):
+        running.result()

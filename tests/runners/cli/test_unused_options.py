@@ -1,0 +1,109 @@
+"""Options that would change nothing are refused, in every command."""
+
+from __future__ import annotations
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from ascentwind.model.errors import AscentwindError
+from ascentwind.runners.cli.app import app
+
+SOUNDINGS = ["--soundings", "none.csv"]
+APPLY = ["wind", "apply", ".", "--component", "zonal", "--azimuth", "0", "--site", "x"]
+DESIGN = """format = 1
+vehicle = "as504"
+times = "70,75"
+[parameters]
+"control.T1.gain" = [0.9, 1.1]
+"""
+
+# what is typed, and what must be said
+UNUSED = [
+    *(
+        (["wind", *command, *SOUNDINGS, *option], f"{option[0]} is not used with --soundings")
+        for command in (["stats"], ["fit"], ["check", "{filter}"], ["plot", "{filter}"])
+        for option in (["--period", "march"], ["--edition", "1983"])
+    ),
+    (["wind", "fit", "--method", "linear-regression", "--time-limit", "9"], "--time-limit is not used by linear"),
+    (["wind", "fit", "--method", "impulse-response", "--noises", "2"], "makes filters of one noise"),
+    (["wind", "stats", "--top", "50000"], "50000 m is not among them"),
+    (APPLY, "--site is not used without --soundings"),
+    ([*APPLY, *SOUNDINGS, "--period", "may"], "--period is not used with --soundings"),
+    ([*APPLY, *SOUNDINGS, "--edition", "2006"], "--edition is not used with --soundings"),
+    (["equations", "as504", "--page", "p.md", "--of", "4-1"], "--of is not used with --page"),
+    (["equations", "as504", "--page", "p.md", "--of", "4-1", "--by", "mass"], "not used with --page"),
+    (["equations", "as504", "--by", "mass"], "--by mass needs --of"),
+    (["sensitivity", "as504", "--quantity", "mean", "--source", "wind"], "--source is not used with --quantity mean"),
+    (["design", "design.toml", "--trade"], "--trade is not used with design.toml, which has no"),
+    (["design", "design.toml", "--no-trade"], "not used with design.toml, which has no"),
+    (["run", "as504", "--engine", "sweep", "--method", "bdf"], "engine 'sweep' takes no method"),
+    (["run", "as504", "--engine", "covariance", "--method", "bdf"], "engine 'covariance' takes no method"),
+    (["run", "as504", "--engine", "ensemble", "--tolerance", "1e-6"], "engine 'ensemble' takes no relative tolerance"),
+    (["run", "as504", "--times", "70", "--set", 'default_times="80"'], "--set default_times is not used with --times"),
+    (["run", "as504", "--set", 'wind.correlation.source="x"'], 'used with wind.synthesis = "closed_form"'),
+    (
+        ["run", "as504", "--set", 'wind.synthesis="closed_form"', "--set", 'wind.filter="x.json"'],
+        'used with wind.synthesis = "fitted"',
+    ),
+    (["run", "as504", "--set", 'loads.0.local.interpolation="linear"'], "options.local_angle_of_attack = true"),
+    (["run", "as504", "--set", 'tables.local_aerodynamics.source="x"'], "options.local_angle_of_attack = true"),
+]
+
+# Options of every command: an option that is not here must be looked at, whether some other one makes it idle
+KNOWN = {
+    "run": {"times", "out", "engine", "method", "tolerance", "changes", "along_vehicle"},
+    "vehicles": set(),
+    "new-vehicle": {"source"},
+    "inspect": {"time", "json"},
+    "regenerate": {"out"},
+    "doctor": set(),
+    "cache": {"clean"},
+    "verify": {"times", "runs", "seed", "out"},
+    "tolerance": {"times", "out"},
+    "sensitivity": {"response", "time", "source", "quantity", "out"},
+    "equations": {"of", "by", "page"},
+    "study": {"out", "scheduler"},
+    "mean": {"out"},
+    "design": {"out", "trades"},
+    "reproduce": {"out"},
+    "build-vehicle": {"out", "figures", "spacing"},
+    "wind apply": {"component", "azimuth", "sign", "period", "edition", "soundings", "site"},
+    "wind stats": {"period", "component", "edition", "top", "soundings"},
+    "wind fit": {
+        "period", "component", "edition", "top", "soundings", "method", "order", "noises", "time_limit", "out",
+    },
+    "wind check": {"period", "component", "edition", "top", "soundings", "profiles"},
+    "wind plot": {"period", "component", "edition", "top", "soundings", "vehicle", "out"},
+    "wind compare": {"time", "response"},
+}  # fmt: skip
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    """A folder of its own to run in, and a filter."""
+    from ascentwind.model.vehicle.shipped import built_in_vehicles
+
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "design.toml").write_text(DESIGN)
+    return str(built_in_vehicles()["as504"] / "wind_march_zonal_filter.json")
+
+
+@pytest.mark.parametrize(("arguments", "says"), UNUSED, ids=lambda x: " ".join(x) if isinstance(x, list) else "")
+def test_an_option_that_changes_nothing_is_refused(here, arguments, says):
+    found = CliRunner().invoke(app, [a.replace("{filter}", here) for a in arguments])
+    assert isinstance(found.exception, AscentwindError), found.output
+    assert says in str(found.exception)
+
+
+def test_every_option_was_looked_at():
+    def options(command) -> set[str]:
+        return {p.name for p in command.params if p.param_type_name == "option"} - {"help"}
+
+    found = {}
+    for name, command in typer.main.get_command(app).commands.items():
+        if hasattr(command, "commands"):
+            found |= {f"{name} {inner}": options(c) for inner, c in command.commands.items()}
+        else:
+            found[name] = options(command)
+    assert found == KNOWN

@@ -1,0 +1,157 @@
+"""Bending-moment coefficients: against particles under Newton's laws, from the other side of the cut, and refusals."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from small_construction import small_construction
+
+from ascentwind.model.errors import DataError
+from ascentwind.runners.construct.aerodynamics import intensity, knots
+from ascentwind.runners.construct.line_integrals import Line
+from ascentwind.runners.construct.loads import LoadedVehicle, load_coefficients
+
+STATIONS = np.array([-2.0, -1.0, 4.0, 10.0, 17.5, 28.0])
+THRUST, SPEED, PRESSURE = 3e5, 400.0, 2e4
+
+
+@pytest.fixture(scope="module")
+def vehicle() -> LoadedVehicle:
+    """Uneven masses and two polynomials, made orthogonal to rigid motion, as modes."""
+    construction = small_construction()
+    edges = np.linspace(-2, 28, 61)
+    line = Line.cut_at(edges, knots(construction), STATIONS)
+    rng = np.random.default_rng(2)
+    mass = line.spread(edges, rng.uniform(50, 900, 60))
+    rotary = line.spread(edges, rng.uniform(0, 50, 60))
+    shapes, rotations = [], []
+    for values in rng.uniform(-1, 1, (2, edges.size)):
+        slope = np.gradient(values, edges)
+        shapes.append(line.linear(edges, values))
+        rotations.append(line.linear(edges, slope))
+    shapes, rotations = np.array(shapes), np.array(rotations)
+    x = line.points
+    rigid = np.array([np.ones_like(x), x])
+    turned = np.array([np.zeros_like(x), np.ones_like(x)])
+    gram = np.array([[line.total(mass * a * b + rotary * p * q) for b, q in zip(rigid, turned, strict=True)]
+                     for a, p in zip(rigid, turned, strict=True)])  # fmt: skip
+    for k in range(2):
+        pairs = zip(rigid, turned, strict=True)
+        c = np.linalg.solve(gram, [line.total(mass * a * shapes[k] + rotary * p * rotations[k]) for a, p in pairs])
+        shapes[k] -= c @ rigid
+        rotations[k] -= c @ turned
+    air = PRESSURE * construction.reference_area * intensity(construction, [1.4], x)[0]
+    return LoadedVehicle(line, mass, rotary, air, THRUST, SPEED, shapes, rotations, np.array([4000.0]), np.array([9.0]))
+
+
+def particle_moments(vehicle: LoadedVehicle, force, couple, masses, rotary, side: int):
+    """Bending moment at STATIONS from Newton's laws for rigid particles, by the part forward (1) or aft (-1)."""
+    x = vehicle.line.points
+    mass, center = masses.sum(), (x * masses).sum() / masses.sum()
+    inertia = (masses * (x - center) ** 2).sum() + rotary.sum()
+    lateral = force.sum() / mass
+    turning = ((x - center) * force + couple).sum() / inertia
+    net = force - masses * (lateral + turning * (x - center))
+    net_couple = couple - rotary * turning
+    found = []
+    for s in STATIONS:
+        part = (x - s) * side > 0
+        found.append(side * ((x - s) * net + net_couple)[part].sum())
+    return np.array(found)
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_air_and_engine_moments_are_those_of_particles_from_either_side(vehicle, side):
+    """The aft part gives the same moment as the forward part: inertia meets every force."""
+    weights = vehicle.line.weights
+    masses, rotary = vehicle.mass * weights, vehicle.rotary_inertia * weights
+    zero = np.zeros_like(masses)
+    found = load_coefficients(vehicle, STATIONS)
+    air = vehicle.normal_force * weights
+    expected = particle_moments(vehicle, air, zero, masses, rotary, side)
+    np.testing.assert_allclose(found.angle_of_attack, expected, atol=1e-10 * np.abs(expected).max())
+    nearest = int(np.argmin(np.abs(vehicle.line.points)))
+    x = vehicle.line.points[nearest]
+    force, couple = zero.copy(), zero.copy()
+    force[nearest], couple[nearest] = THRUST, -THRUST * x  # moved to the gimbal plane by a couple
+    expected = particle_moments(vehicle, force, couple, masses, rotary, side)
+    np.testing.assert_allclose(found.engine_angle, expected, atol=1e-10 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_moved_normal_force_is_a_couple_at_every_particle(vehicle, side):
+    """Each force moved forward by a metre is the force and a couple as large: from either side, at every station."""
+    weights = vehicle.line.weights
+    masses, rotary = vehicle.mass * weights, vehicle.rotary_inertia * weights
+    air = vehicle.normal_force * weights
+    expected = particle_moments(vehicle, np.zeros_like(air), air, masses, rotary, side)
+    found = load_coefficients(vehicle, STATIONS).center_of_pressure
+    np.testing.assert_allclose(found, expected, atol=1e-10 * np.abs(expected).max())
+
+
+def test_moments_vanish_at_both_ends(vehicle):
+    line = vehicle.line
+    ends = load_coefficients(vehicle, line.edges[[0, -1]])
+    size = load_coefficients(vehicle, STATIONS)
+    names = ("angle_of_attack", "engine_angle", "center_of_pressure", "bending", "attitude_rate")
+    for name in (*names, "bending_displacement", "bending_rate"):
+        scale = np.abs(getattr(size, name)).max()
+        np.testing.assert_allclose(getattr(ends, name), 0.0, atol=1e-11 * scale, err_msg=name)
+    assert ends.first_moment[0] == pytest.approx(line.total(vehicle.mass * (line.points - line.edges[0])), rel=1e-12)
+
+
+def test_bending_moment_of_a_mode_is_its_inertia_from_either_side(vehicle):
+    weights, x = vehicle.line.weights, vehicle.line.points
+    found = load_coefficients(vehicle, STATIONS).bending
+    for k in range(2):
+        net = -vehicle.mass * weights * vehicle.displacement[k]
+        couple = -vehicle.rotary_inertia * weights * vehicle.rotation[k]
+        for side in (1, -1):
+            expected = [side * ((x - s) * net + couple)[(x - s) * side > 0].sum() for s in STATIONS]
+            np.testing.assert_allclose(found[k], expected, atol=1e-10 * np.abs(found[k]).max())
+
+
+def test_slosh_with_the_answer_of_the_rigid_body_closes_at_both_ends(vehicle):
+    """M'_xi and S_1, S_2 together are the moment of a lateral force and a couple on the free vehicle."""
+    line, weights = vehicle.line, vehicle.line.weights
+    masses, rotary = vehicle.mass * weights, vehicle.rotary_inertia * weights
+    zero = np.zeros_like(masses)
+    c = load_coefficients(vehicle, STATIONS)
+    m, point = vehicle.slosh_mass[0], vehicle.slosh_point[0]
+    mass, center = masses.sum(), (line.points * masses).sum() / masses.sum()
+    inertia = (masses * (line.points - center) ** 2).sum() + rotary.sum()
+    nearest = int(np.argmin(np.abs(line.points - point)))
+    force, couple = zero.copy(), zero.copy()
+    force[nearest], couple[nearest] = -m, -m * (point - line.points[nearest])
+    answer = m * c.first_moment / mass + m * (point - center) * c.second_moment / inertia
+    for side in (1, -1):
+        expected = particle_moments(vehicle, force, couple, masses, rotary, side)
+        np.testing.assert_allclose(c.slosh[0] + answer, expected, atol=1e-10 * np.abs(expected).max())
+    couple = zero.copy()
+    couple[nearest] = m * 12.0  # weight of a displaced slosh mass, axial acceleration 12 m/s2
+    expected = particle_moments(vehicle, zero, couple, masses, rotary, 1)
+    hanging = 12.0 * m * ((point > STATIONS) - c.second_moment / inertia)
+    np.testing.assert_allclose(hanging, expected, atol=1e-10 * np.abs(expected).max())
+
+
+def test_local_angle_of_attack_terms_are_loads_of_their_forces(vehicle):
+    weights, x = vehicle.line.weights, vehicle.line.points
+    masses, rotary = vehicle.mass * weights, vehicle.rotary_inertia * weights
+    zero, c = np.zeros_like(masses), load_coefficients(vehicle, STATIONS)
+    center = (x * masses).sum() / masses.sum()
+    cases = [(c.attitude_rate, -(x - center) / SPEED)]
+    for k in range(2):
+        cases.append((c.bending_displacement[k], vehicle.rotation[k]))
+        cases.append((c.bending_rate[k], -vehicle.displacement[k] / SPEED))
+    for found, angle in cases:
+        force = vehicle.normal_force * weights * angle
+        expected = particle_moments(vehicle, force, zero, masses, rotary, -1)
+        np.testing.assert_allclose(found, expected, atol=1e-10 * np.abs(expected).max())
+
+
+def test_modes_of_other_masses_are_refused(vehicle):
+    shifted = replace(vehicle, displacement=vehicle.displacement + np.array([[0.0], [0.2]]))
+    with pytest.raises(DataError, match="mode 2 moves"):
+        load_coefficients(shifted, STATIONS)

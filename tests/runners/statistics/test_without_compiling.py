@@ -1,0 +1,95 @@
+"""compile=False compiles nowhere: what may choose takes CVODES, what is named and needs a compiler refuses."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from lag import GAIN, closed_form, dispersion, lag, normal
+
+from ascentwind.codegen.ensemble.compiled import EnsembleNeedsCompilerError
+from ascentwind.codegen.toolchain.compiler import Compiler
+from ascentwind.codegen.toolchain.library import NoCompilerError
+from ascentwind.runners import Study
+from ascentwind.runners.parameter_study import run_parameter_study
+from ascentwind.runners.solvers.ensemble import EnsembleOptions
+from ascentwind.runners.solvers.integration import IntegratorOptions
+from ascentwind.runners.solvers.sweep import SweepOptions
+from ascentwind.runners.statistics.engines import engine_options
+
+
+@pytest.fixture
+def interpreted(monkeypatch, tmp_path) -> Study:
+    """A study on a machine where compiling would end the test, with an empty cache."""
+
+    system = lag().system
+    monkeypatch.setattr(Compiler, "compile", lambda *_: pytest.fail("something was compiled"))
+    monkeypatch.setenv("ASCENTWIND_CACHE", str(tmp_path / "cache"))
+    return Study.from_system(system, compile=False)
+
+
+def test_an_engine_left_to_choose_is_cvodes(interpreted):
+    found = interpreted.response_statistics([2.0, 3.0], check=True)
+    assert found.attrs["engine"] == "cvodes"
+    mean, std = closed_form(np.array([2.0, 3.0]))
+    np.testing.assert_allclose(found.std.sel(source="combined").values[:, 0], std, rtol=1e-6)
+    np.testing.assert_allclose(found.mean.sel(source="combined").values[:, 0], mean, rtol=1e-6)
+
+
+def test_a_batch_is_computed_by_cvodes(interpreted):
+    found = interpreted.batch([{"gain": GAIN}, {"gain": 2 * GAIN}], [2.0, 3.0])
+    assert found.attrs["engine"] == "cvodes"
+    mean, std = closed_form(np.array([2.0, 3.0]))
+    for member, factor in enumerate((1, 2)):
+        part = found.sel(source="combined").isel(member=member, response=0)
+        np.testing.assert_allclose(part["std"], factor * std, rtol=1e-6)
+        np.testing.assert_allclose(part["mean"], factor * mean, rtol=1e-6)
+
+
+def test_questions_without_an_engine_are_answered(interpreted):
+    std = closed_form(3.0)[1]
+    assert interpreted.sensitivity("x", 3.0)["derivative"].sel(parameter="gain") == pytest.approx(std / GAIN, rel=1e-7)
+    assert interpreted.sensitivities(["x"], [3.0])["value"].item() == pytest.approx(std, rel=1e-7)
+    assert interpreted.second_derivatives("x", 3.0, ["gain"])["second_derivative"].item() == pytest.approx(0, abs=1e-9)
+    assert "noise_weighting" in interpreted.weighting_function(3.0)
+    assert interpreted.with_parameters({"gain": 1.0}).response_statistics([3.0]).attrs["engine"] == "cvodes"
+    assert interpreted.response_statistics([3.0], options=IntegratorOptions()).attrs["code"] == "interpreter"
+
+
+@pytest.mark.parametrize(
+    ("ask", "refusal"),
+    [
+        (lambda s, _: s.response_statistics([3.0], engine="sweep"), NoCompilerError),
+        (lambda s, _: s.response_statistics([3.0], options=SweepOptions()), NoCompilerError),
+        (lambda s, _: s.response_statistics([3.0], engine="ensemble"), EnsembleNeedsCompilerError),
+        (lambda s, _: s.response_statistics([3.0], options=EnsembleOptions()), EnsembleNeedsCompilerError),
+        (lambda s, _: s.batch([{}], [3.0], options=SweepOptions()), NoCompilerError),
+        (lambda s, _: s.batch([{}], [3.0], threads=1), NoCompilerError),
+        (lambda s, _: s.weighting_functions([3.0]), NoCompilerError),
+        (
+            lambda s, path: run_parameter_study(
+                dispersion(2, normal("gain", 0.1)) | {"times": "3"}, path / "study", study=s
+            ),
+            NoCompilerError,
+        ),
+    ],
+)
+def test_what_needs_a_compiler_refuses(interpreted, tmp_path, ask, refusal):
+    with pytest.raises(refusal, match="loaded with compile=False"):
+        ask(interpreted, tmp_path)
+
+
+def test_a_tolerance_alone_leaves_the_choice():
+    assert engine_options(None, relative_tolerance=1e-6) == ("sweep", SweepOptions(1e-6))
+    assert engine_options(None, compiled=False, relative_tolerance=1e-6)[0] == "cvodes"
+    assert engine_options("sweep", compiled=False, relative_tolerance=1e-6)[0] == "sweep"
+
+
+@pytest.mark.filterwarnings("ignore:wind filter")  # AS-504's ends at 30 km
+def test_a_vehicle_compiles_nowhere(monkeypatch, tmp_path):
+    monkeypatch.setattr(Compiler, "compile", lambda *_: pytest.fail("something was compiled"))
+    monkeypatch.setenv("ASCENTWIND_CACHE", str(tmp_path / "cache"))
+    study = Study.load("as504", compile=False)
+    assert study.response_statistics([12.0]).attrs["engine"] == "cvodes"
+    assert study.batch([{"thrust.sigma": 0.02}], [12.0]).attrs["engine"] == "cvodes"
+    assert study.vehicle is not None
+    assert study.with_wind(study.vehicle.wind).response_statistics([11.0]).attrs["engine"] == "cvodes"
