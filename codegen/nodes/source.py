@@ -13,7 +13,12 @@ ARGUMENTS = {
     "quadratic_gradient": ("t", "v", "z", "a", "y", "c", "m"),
     "linear_gradient": ("t", "v", "z", "a", "x", "c"),
 }
-SOURCE_FILES = ("node_source.py", "expressions.py", "templates/node_functions.c.jinja", "templates/collocation.c")
+SOURCE_FILES = (
+    "nodes/source.py",
+    "toolchain/c_printer.py",
+    "templates/node_functions.c.jinja",
+    "templates/collocation.c",
+)
 _ENVIRONMENT = template_environment(trim_blocks=True, lstrip_blocks=True)
 
 

@@ -47,7 +47,7 @@ def sweep_functions(system: LinearSystem) -> SweepFunctions:
 
 def sweep_fingerprint(system: LinearSystem, functions: SweepFunctions) -> str:
     """Return a hash of all that ``sweep_source`` writes from."""
-    files = ("sweep_source.py", "runge_kutta.py", "expressions.py", "templates/sweep.c.jinja")
+    files = ("sweep/source.py", "sweep/runge_kutta.py", "toolchain/c_printer.py", "templates/sweep.c.jinja")
     return fingerprint(system, (functions.stage, functions.output), files)
 
 

@@ -129,7 +129,7 @@ def c_source(system: LinearSystem, core: CoreFunctions) -> str:
 def source_fingerprint(system: LinearSystem, core: CoreFunctions) -> str:
     """Return a hash of all that ``c_source`` writes from."""
     functions = (getattr(core, field.name) for field in fields(core))
-    return fingerprint(system, functions, ("source.py", "expressions.py", "templates/system.c.jinja"))
+    return fingerprint(system, functions, ("system/source.py", "toolchain/c_printer.py", "templates/system.c.jinja"))
 
 
 def _integrand_interface(

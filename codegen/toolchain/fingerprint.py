@@ -10,6 +10,8 @@ import casadi as ca
 
 from ...model.system.linear_system import LinearSystem
 
+_CODEGEN = Path(__file__).parents[1]
+
 
 def fingerprint(system: LinearSystem, functions: Iterable[ca.Function], files: Iterable[str]) -> str:
     """Return a hash of arithmetic, names, structure and code generator.
@@ -20,7 +22,7 @@ def fingerprint(system: LinearSystem, functions: Iterable[ca.Function], files: I
     functions : iterable of Function
         The arithmetic that is written as C.
     files : iterable of str
-        Modules and templates of this package that write it.
+        Modules and templates that write it, below ``codegen``.
     """
     digest = hashlib.sha256()
     for function in functions:
@@ -32,5 +34,5 @@ def fingerprint(system: LinearSystem, functions: Iterable[ca.Function], files: I
     for g in system.tables:
         digest.update(repr((g.name, g.argument, g.names, g.units, g.knots.size)).encode())
     for file in files:
-        digest.update((Path(__file__).parent / file).read_bytes())
+        digest.update((_CODEGEN / file).read_bytes())
     return digest.hexdigest()
