@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ...codegen.nodes.compiled import node_functions
 from ...model.errors import IntegrationError, UnstableSystemWarning
 from ...model.system.linear_system import COMBINED
+from ..sensitivity.gradient import gradient_of
 from ..sensitivity.pair import AdjointPair
 from ..solvers.flight_nodes import FlightNodes
 from ..solvers.sweep import SweepOptions
@@ -56,5 +57,5 @@ def gradients(study: Study, rows: Iterable[Row], parameters: tuple[str, ...]) ->
     found = {}
     for response, sign, time in rows:
         pair = pairs[response, time]
-        found[response, sign, time] = pair.gradient(0.5 * SIGMAS / np.sqrt(pair.variance), sign).parameters[columns]
+        found[response, sign, time] = gradient_of(pair, 0.5 * SIGMAS / np.sqrt(pair.variance), sign).parameters[columns]
     return found

@@ -24,6 +24,7 @@ from ..case.wind_start import covariance_at
 from ..solvers.adjoint import AdjointSolver
 from ..solvers.integration import IntegratorOptions
 from ..solvers.mean_response import mean_response, with_mean_tables
+from .gradient import gradient_of
 from .knots import vehicle_rows
 from .one import sensitivity
 from .request import Request
@@ -95,7 +96,7 @@ def check_sensitivity(
     meeting: Mapping[int, float] = {}
     if case.system.conditions:  # switches that meet within the differences would spoil them
         pair = request.pair(case, time)
-        meeting = {i: far for i, far in pair.gradient(*request.factors(pair)).reach.items() if far > 0}
+        meeting = {i: far for i, far in gradient_of(pair, *request.factors(pair)).reach.items() if far > 0}
     labels, at, derivatives, differences = [], [], [], []
     for name, number, derivative in zip(
         found["parameter"].values.tolist(), found["parameter_value"].values, found["derivative"].values, strict=True

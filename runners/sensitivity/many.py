@@ -16,6 +16,7 @@ from ..case.times import end_times
 from ..solvers.cores import available_cores
 from ..solvers.flight_nodes import FlightNodes
 from ..solvers.stability import warn_if_unstable
+from .gradient import gradient_of
 from .one import refuse_undefined
 from .pair import AdjointPair
 from .peak import check_end_time
@@ -48,7 +49,7 @@ def sensitivities(
     def one(asked: tuple[float, Request]) -> tuple[float, NDArray[np.float64]]:
         time, request = asked
         pair = AdjointPair(flight, request.row, time, request.sources)
-        gradient = pair.gradient(*request.factors(pair))
+        gradient = gradient_of(pair, *request.factors(pair))
         refuse_undefined(case.system, gradient, rows)
         return request.value(pair.variance, pair.mean), gradient.parameters[rows]
 

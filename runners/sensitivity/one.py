@@ -13,8 +13,8 @@ from ...model.errors import AscentwindWarning, SwitchError
 from ...model.system.linear_system import COMBINED, LinearSystem
 from ..case.provenance import provenance
 from ..solvers.stability import warn_if_unstable
+from .gradient import Gradient, gradient_of
 from .knots import knot_sensitivities
-from .pair import Gradient
 from .peak import end_time
 from .request import Request, ZeroQuantityError, parameter_rows
 from .start import start_share
@@ -45,7 +45,7 @@ def sensitivity(
     warn_if_unstable(case.executable, time)
     pair = request.pair(case, time)
     factors = request.factors(pair)
-    gradient = pair.gradient(*factors, at_peak=at_peak and not at_limit)
+    gradient = gradient_of(pair, *factors, at_peak=at_peak and not at_limit)
     refuse_undefined(case.system, gradient, rows)
     value = request.value(pair.variance, pair.mean)
     if elasticity and value == 0:

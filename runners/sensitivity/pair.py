@@ -5,7 +5,7 @@ no covariance matrix (docs/sensitivity.md):
 
     dVar/dq = integral [ 2 a'(dA/dq) y + a' d(BB')/dq a ] dt + a(t0)'(dP0/dq) a(t0) + 2 (dC_i/dq) y(t2)
 
-A parameter that moves a switch of the equations adds what it moves (switch_gradient.py).
+A parameter that moves a switch of the equations adds what it moves (switches.py, gradient.py).
 
 The noise columns depend on the mean response m = (alpha, beta, phi); that path is a second adjoint, driven by
 dVar/dm. The mean itself is C_i x + G_i u with x' = A x + E u.
@@ -13,8 +13,7 @@ dVar/dm. The mean itself is C_i x + G_i u with x' = A x + E u.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -25,35 +24,8 @@ from ..solvers.collocation_grid import STAGES, tables_at
 from ..solvers.flight_nodes import FlightNodes
 from ..solvers.start_functions import start_functions
 from ..solvers.time_nodes import interval_after, interval_before
-from .switches import through_switches
 
 SLOPE_STEP = 1e-3  # s, of central differences of the output matrices, which are cubic in time
-
-
-@dataclass(frozen=True, eq=False)
-class Gradient:
-    """A number and its derivatives.
-
-    Attributes
-    ----------
-    value : float
-    parameters : (n_p,) array
-    tables : (k, n_v) array
-        Derivative with respect to a table's value at a node, per second.
-    tables_at_end : (n_v,) array
-        Weight of the delta that the latter holds at t = t2.
-    undefined : dict of int to str
-        Parameters by which there is no derivative, because of a switch that they move, and why.
-    reach : dict of int to float
-        Parameters that move a switch, and how far before it meets another, the start or t2.
-    """
-
-    value: float
-    parameters: NDArray[np.float64]
-    tables: NDArray[np.float64]
-    tables_at_end: NDArray[np.float64]
-    undefined: Mapping[int, str] = field(default_factory=dict)
-    reach: Mapping[int, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,21 +160,6 @@ class AdjointPair:
                 1.0,
             )
         return Combination(numbers, along, last, adjoint, on_outputs, on_outputs_end)
-
-    def gradient(self, variance_factor: float, mean_factor: float, at_peak: bool = False) -> Gradient:
-        """Return the derivatives of ``variance_factor`` variance + ``mean_factor`` mean.
-
-        ``at_peak`` says that t2 is where it is largest: on a switch that moves, the peak moves along.
-        """
-        p, found = self.executable.parameters, self.combine(variance_factor, mean_factor)
-        parameters = self.flight.functions.by_parameters(p, found.numbers)
-        if variance_factor:
-            by_start = start_functions(self.executable.system, self.sources)[1](p, self.adjoint_at_start)
-            parameters = parameters + variance_factor * np.array(by_start, float).ravel()
-        by_switches = through_switches(self, variance_factor, mean_factor, at_peak)
-        parameters = parameters + by_switches.parameters
-        value = variance_factor * self.variance + mean_factor * self.mean
-        return Gradient(value, parameters, found.tables, found.tables_at_end, by_switches.undefined, by_switches.reach)
 
     def mean_path(self, on_tables: NDArray, on_tables_end: NDArray) -> MeanPath | None:
         """Give what the variance owes to the tables of the mean response to the mean's states and outputs."""

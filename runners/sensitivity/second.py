@@ -26,6 +26,7 @@ from ..case.provenance import provenance
 from ..solvers.collocation_grid import STAGES
 from ..solvers.stability import warn_if_unstable
 from ..solvers.start_functions import start_functions
+from .gradient import gradient_of
 from .one import refuse_undefined
 from .pair import AdjointPair, Combination
 from .peak import end_time
@@ -55,14 +56,14 @@ def second_derivatives(
     warn_if_unstable(case.executable, at)
     pair = request.pair(case, at)
     factors = request.factors(pair)
-    gradient = pair.gradient(*factors)
+    gradient = gradient_of(pair, *factors)
     refuse_undefined(case.system, gradient, rows)
     combined = pair.combine(*factors)
     moving = [k for k, row in enumerate(rows) if row in gradient.reach]
     hessian = np.array([_column(pair, combined, factors, row)[rows] for row in rows])
     curvature = request.curvature(pair)
     if curvature:
-        of_variance = pair.gradient(1.0, 0.0).parameters[rows]
+        of_variance = gradient_of(pair, 1.0, 0.0).parameters[rows]
         hessian = hessian + curvature * np.outer(of_variance, of_variance)
     for k in moving:
         hessian[k] = _by_differences(case, request, at, rows, k, gradient.reach[rows[k]])
@@ -105,7 +106,7 @@ def _by_differences(
 
     def gradient(at: float) -> NDArray[np.float64]:
         pair = request.pair(case.with_parameters({name: at}), time)
-        return pair.gradient(*request.factors(pair)).parameters[rows]
+        return gradient_of(pair, *request.factors(pair)).parameters[rows]
 
     step = min(0.25 * reach, DIFFERENCE * (abs(value) or 1.0))
     slopes = [(gradient(value + h) - gradient(value - h)) / (2 * h) for h in (step, step / 2, step / 4)]

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import casadi as ca
 import numpy as np
@@ -19,9 +18,7 @@ from ...model.vehicle.vehicle import Vehicle
 from ...model.wind.shaping_filter import ShapingFilter, entry_name
 from ..solvers.collocation import Collocation
 from ..solvers.collocation_grid import STAGES, Grid
-
-if TYPE_CHECKING:
-    from .pair import AdjointPair
+from .pair import AdjointPair
 
 RATE = 0.3  # longest step times the filter's rates
 

@@ -11,15 +11,12 @@ with a the adjoint, y its product with the covariance and x the mean, all three 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...model.system.time_conditions import Stops
-
-if TYPE_CHECKING:
-    from .pair import AdjointPair
+from .pair import AdjointPair
 
 NOTHING = 1e-9  # of the two sides of a switch, a difference between them that is rounding
 TOGETHER = 1e-9  # relative difference of two velocities with which switches move as one

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from ...model.tables import TableGroup
 from ..solvers.collocation_grid import tables_at
-from .pair import AdjointPair, Gradient
+from .gradient import Gradient
+from .pair import AdjointPair
 from .start import StartShare
 
 if TYPE_CHECKING:
