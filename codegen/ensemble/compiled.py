@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-import hashlib
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -12,15 +11,11 @@ from numpy.typing import NDArray
 
 from ...model.errors import AscentwindError
 from ...model.system.linear_system import LinearSystem
-from ..toolchain.c_printer import template_environment
 from ..toolchain.cache import CompiledLibrary, compiled_library, wrong_numbers
 from ..toolchain.compiler import find_compiler
 from ..toolchain.interruption import call
 from .check import AGREEMENT, difference_from_numpy
-
-LANES = 32  # runs side by side in the vector registers
-_TEMPLATE = "ensemble.c.jinja"
-_ENVIRONMENT = template_environment()
+from .source import ensemble_fingerprint, ensemble_sizes, ensemble_source
 
 
 class EnsembleNeedsCompilerError(AscentwindError):
@@ -90,17 +85,6 @@ class CompiledEnsemble:
         return z
 
 
-def ensemble_source(system: LinearSystem) -> str:
-    """Return the C source for the sizes of a system."""
-    return _ENVIRONMENT.get_template(_TEMPLATE).render(
-        title=system.name,
-        states=len(system.states),
-        sources=len(system.sources),
-        outputs=len(system.outputs),
-        lanes=LANES,
-    )
-
-
 def compiled_ensemble(system: LinearSystem) -> CompiledEnsemble:
     """Compile the ensemble of a system, or take it from the cache; hold its numbers against NumPy's.
 
@@ -114,14 +98,16 @@ def compiled_ensemble(system: LinearSystem) -> CompiledEnsemble:
             "the ensemble is compiled for each system, and no C compiler was found (CC, cc, gcc, clang); install one, "
             "or use another engine"
         )
-    source = ensemble_source(system)
-    sizes = {
-        "states": str(len(system.states)), "sources": str(len(system.sources)), "outputs": str(len(system.outputs)),
-    }  # fmt: skip
-    fingerprint = hashlib.sha256(source.encode()).hexdigest()
-    library = compiled_library(f"{system.name}-ensemble", fingerprint, lambda: source, compiler, sizes)
+    sizes = ensemble_sizes(system)
+    library = compiled_library(
+        f"{system.name}-ensemble",
+        ensemble_fingerprint(system),
+        lambda: ensemble_source(system),
+        compiler,
+        {name: str(size) for name, size in sizes.items()},
+    )
     engine = CompiledEnsemble(library)
-    difference = difference_from_numpy(engine, *map(int, sizes.values()))
+    difference = difference_from_numpy(engine, **sizes)
     if not difference <= AGREEMENT:
         raise wrong_numbers(library, difference)
     return engine

@@ -5,7 +5,8 @@ from __future__ import annotations
 import casadi as ca
 
 from ...model.system.linear_system import LinearSystem
-from ..toolchain.c_printer import c_statements, enumerators, template_environment
+from ..toolchain.c_printer import c_statements, enumerators
+from ..toolchain.templates import render
 
 LANES = 8  # points side by side: one 512-bit register, two of 256 bits
 ARGUMENTS = {
@@ -15,11 +16,9 @@ ARGUMENTS = {
 }
 SOURCE_FILES = (
     "nodes/source.py",
-    "toolchain/c_printer.py",
     "templates/node_functions.c.jinja",
     "templates/collocation.c",
 )
-_ENVIRONMENT = template_environment(trim_blocks=True, lstrip_blocks=True)
 
 
 def nodes_source(system: LinearSystem, functions: tuple[ca.Function, ...]) -> str:
@@ -49,7 +48,8 @@ def nodes_source(system: LinearSystem, functions: tuple[ca.Function, ...]) -> st
                 ),
             }
         )
-    return _ENVIRONMENT.get_template("node_functions.c.jinja").render(
+    return render(
+        "node_functions.c.jinja",
         title=f"{system.name}: matrices, and gradients with respect to numbers and table values",
         table_names=tables,
         lanes=LANES,

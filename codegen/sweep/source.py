@@ -7,14 +7,13 @@ from dataclasses import dataclass
 import casadi as ca
 
 from ...model.system.linear_system import LinearSystem
-from ..toolchain.c_printer import c_function, c_statements, enumerators, template_environment
+from ..toolchain.c_printer import c_function, c_statements, enumerators
 from ..toolchain.fingerprint import fingerprint
+from ..toolchain.templates import render
 from .runge_kutta import DOP853, RungeKutta
 
 LANES = 8  # columns side by side: one 512-bit register, two of 256 bits
 MOST_STEPS = 200_000  # of one sweep; AS-504 takes 5000 at the tolerance of 1e-7, 18,000 at 1e-12
-
-_ENVIRONMENT = template_environment(trim_blocks=True, lstrip_blocks=True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +46,7 @@ def sweep_functions(system: LinearSystem) -> SweepFunctions:
 
 def sweep_fingerprint(system: LinearSystem, functions: SweepFunctions) -> str:
     """Return a hash of all that ``sweep_source`` writes from."""
-    files = ("sweep/source.py", "sweep/runge_kutta.py", "toolchain/c_printer.py", "templates/sweep.c.jinja")
+    files = ("sweep/source.py", "sweep/runge_kutta.py", "templates/sweep.c.jinja")
     return fingerprint(system, (functions.stage, functions.output), files)
 
 
@@ -62,7 +61,8 @@ def sweep_source(system: LinearSystem, functions: SweepFunctions, formula: Runge
     C = functions.output.sparsity_out(0)
     noises = [(i, k) for k, source in enumerate(system.sources) for i in system.noise_columns(source)]
     weighted = [i for i, b in enumerate(formula.weights) if b != 0.0]
-    return _ENVIRONMENT.get_template("sweep.c.jinja").render(
+    return render(
+        "sweep.c.jinja",
         title=f"{system.name}: all end times in one pass",
         structure=system.structure,
         system=system,

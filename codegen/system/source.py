@@ -9,11 +9,10 @@ import casadi as ca
 import numpy as np
 
 from ...model.system.linear_system import LinearSystem
-from ..toolchain.c_printer import c_function, enumerators, template_environment
+from ..toolchain.c_printer import c_function, enumerators
 from ..toolchain.fingerprint import fingerprint
+from ..toolchain.templates import render
 from .functions import INPUTS, INTERVAL, MATRICES, OUTPUTS, CoreFunctions, state_scales
-
-_ENVIRONMENT = template_environment()
 
 
 class _Patterns:
@@ -98,7 +97,8 @@ def c_source(system: LinearSystem, core: CoreFunctions) -> str:
             }
         )
         exported += _integrand_interface(name, system, function, quadratures, ca.diagcat(*[block] * blocks), patterns)
-    return _ENVIRONMENT.get_template("system.c.jinja").render(
+    return render(
+        "system.c.jinja",
         title=f"{system.name}: linear time-varying system",
         structure=system.structure,
         states=system.states,
@@ -129,7 +129,7 @@ def c_source(system: LinearSystem, core: CoreFunctions) -> str:
 def source_fingerprint(system: LinearSystem, core: CoreFunctions) -> str:
     """Return a hash of all that ``c_source`` writes from."""
     functions = (getattr(core, field.name) for field in fields(core))
-    return fingerprint(system, functions, ("system/source.py", "toolchain/c_printer.py", "templates/system.c.jinja"))
+    return fingerprint(system, functions, ("system/source.py", "templates/system.c.jinja"))
 
 
 def _integrand_interface(

@@ -5,10 +5,8 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import casadi as ca
-import jinja2
 
 from ...model.errors import AscentwindError
 
@@ -127,25 +125,6 @@ def enumerators(prefix: str, names: Sequence[str]) -> list[str]:
     if len(set(plain)) == len(plain):
         return [f"{prefix}_{name}" for name in plain]
     return [f"{prefix}{i}_{name}" for i, name in enumerate(plain)]
-
-
-def comment(text: object) -> str:
-    """Return a text that stays inside a C comment, whatever it holds: a name or unit of a user's own system."""
-    one_line = "".join(c if c.isprintable() else " " for c in str(text))
-    # a backslash, or its trigraph, joins lines
-    return one_line.replace("\\", "|").replace("??/", "? ? |").replace("*/", "* /").replace("/*", "/ *")
-
-
-def template_environment(**options: Any) -> jinja2.Environment:
-    """Return the environment of the C templates; what comes from names and units passes through ``comment``."""
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("ascentwind.codegen"),
-        undefined=jinja2.StrictUndefined,
-        keep_trailing_newline=True,
-        **options,
-    )
-    environment.filters["comment"] = comment
-    return environment
 
 
 def _number(value: float) -> str:

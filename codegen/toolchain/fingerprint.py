@@ -11,6 +11,7 @@ import casadi as ca
 from ...model.system.linear_system import LinearSystem
 
 _CODEGEN = Path(__file__).parents[1]
+_SHARED = ("toolchain/c_printer.py", "toolchain/templates.py")
 
 
 def fingerprint(system: LinearSystem, functions: Iterable[ca.Function], files: Iterable[str]) -> str:
@@ -22,7 +23,7 @@ def fingerprint(system: LinearSystem, functions: Iterable[ca.Function], files: I
     functions : iterable of Function
         The arithmetic that is written as C.
     files : iterable of str
-        Modules and templates that write it, below ``codegen``.
+        Modules and templates that write it, below ``codegen``; those that write all C are known.
     """
     digest = hashlib.sha256()
     for function in functions:
@@ -33,6 +34,6 @@ def fingerprint(system: LinearSystem, functions: Iterable[ca.Function], files: I
         digest.update(repr((p.name, p.unit)).encode())
     for g in system.tables:
         digest.update(repr((g.name, g.argument, g.names, g.units, g.knots.size)).encode())
-    for file in files:
+    for file in (*files, *_SHARED):
         digest.update((_CODEGEN / file).read_bytes())
     return digest.hexdigest()

@@ -274,7 +274,7 @@ def test_library_found_in_the_cache_is_verified_too(own_cache):
         bad.with_suffix(suffix).replace(good.with_suffix(suffix))
     # another process, which has loaded neither
     program = (
-        f"import sys; sys.path.insert(0, {str(Path(__file__).parents[2] / 'support')!r})\n"
+        f"import sys; sys.path.insert(0, {str(Path(__file__).parent)!r})\n"
         "from test_cache import compiled_sweep, lag; print(compiled_sweep(lag()).shared_library.fresh)"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)

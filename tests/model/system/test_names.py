@@ -16,8 +16,9 @@ from hypothesis import strategies as st
 from ascentwind.codegen.sweep.source import sweep_functions, sweep_source
 from ascentwind.codegen.system.functions import core_functions
 from ascentwind.codegen.system.source import c_source
-from ascentwind.codegen.toolchain.c_printer import comment, enumerators
+from ascentwind.codegen.toolchain.c_printer import enumerators
 from ascentwind.codegen.toolchain.compiler import find_compiler
+from ascentwind.codegen.toolchain.templates import comment
 from ascentwind.model import LinearSystem, define_system
 from ascentwind.model.errors import NonlinearSystemError, NotPicklableError, SystemDefinitionError, UnknownNameError
 from ascentwind.model.system.names import file_name
