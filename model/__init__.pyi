@@ -2,11 +2,11 @@ from .equations.assemble import assemble as assemble
 from .errors import AscentwindError as AscentwindError
 from .errors import AscentwindWarning as AscentwindWarning
 from .system.define import define_system as define_system
+from .system.labels import Noise as Noise
+from .system.labels import Output as Output
+from .system.labels import Parameter as Parameter
+from .system.labels import State as State
 from .system.linear_system import LinearSystem as LinearSystem
-from .system.linear_system import Noise as Noise
-from .system.linear_system import Output as Output
-from .system.linear_system import Parameter as Parameter
-from .system.linear_system import State as State
 from .tables import Table as Table
 from .tables import TableGroup as TableGroup
 from .vehicle.reader import load_vehicle as load_vehicle

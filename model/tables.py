@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 
-import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline, PchipInterpolator, PPoly
@@ -196,23 +195,6 @@ class TableGroup:
             found *= u
             found += c[i, power]
         return found
-
-    def lookup(self, argument: ca.MX, data: ca.MX, offset: int) -> ca.MX:
-        """Return the values as a CasADi expression.
-
-        Parameters
-        ----------
-        argument : MX scalar
-        data : MX vector
-            Run-time vector that holds this group's numbers from ``offset`` on.
-        """
-        k, m = self.knots.size, len(self.names)
-        x = ca.fmin(ca.fmax(argument, data[offset]), data[offset + k - 1])
-        i = ca.low(data[offset : offset + k], x, {"lookup_mode": "binary"})
-        u = x - data.nz[offset + i]
-        first = offset + k + i * (ORDER * m)
-        c0, c1, c2, c3 = (data.nz[first + ca.DM(range(power * m, (power + 1) * m))] for power in range(ORDER))
-        return c0 + u * (c1 + u * (c2 + u * c3))
 
 
 def table_values(groups: Sequence[TableGroup], time: float) -> dict[str, float]:

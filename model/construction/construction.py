@@ -6,7 +6,13 @@ from dataclasses import dataclass
 from typing import Literal
 
 from ..errors import DataError, UnknownNameError
-from .consistency import refuse_misplaced, refuse_repetitions
+from .consistency import (
+    refuse_misplaced,
+    refuse_repeated_engines,
+    refuse_repeated_forces,
+    refuse_repeated_masses,
+    refuse_repeated_stations,
+)
 from .flight import AtmosphereFactors, Drag, EngineGroup, NormalForceComponent, PitchProgramme, Site
 from .structure import LumpedMass, Stiffness, Tank
 from .tank_shape import TankShape
@@ -68,8 +74,14 @@ class Construction:
     slosh_method: Literal["surface_radius", "cylinder", "potential"] = "surface_radius"
 
     def __post_init__(self):
-        refuse_misplaced(self)
-        refuse_repetitions(self)
+        places = {"gimbal_station_m": [self.gimbal_station], "sensor_station_m": [self.sensor_station]}
+        for component in self.normal_force:
+            places[f"normal_force.{component.name}.station_m"] = [float(s) for s in component.station[[0, -1]]]
+        refuse_misplaced(self.aft_end, self.forward_end, places)
+        refuse_repeated_masses(self.masses, self.tanks)
+        refuse_repeated_engines(self.engines)
+        refuse_repeated_forces(self.normal_force)
+        refuse_repeated_stations(self.load_stations, self.stiffness)
         for mass in self.masses:
             mass.require_within(self.aft_end, self.forward_end)
         for tank in self.tanks:

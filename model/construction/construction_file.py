@@ -14,7 +14,6 @@ from ..errors import DataError
 from ..files.csv_table import CsvTable, Order, read_csv_table
 from ..files.folder_files import file_inside
 from ..files.toml_file import read_toml
-from .consistency import check_sizes
 from .construction import Construction
 from .construction_entries import (
     ConstructionFile,
@@ -26,6 +25,7 @@ from .construction_entries import (
     TankEntry,
 )
 from .flight import AtmosphereFactors, Drag, EngineGroup, NormalForceComponent, PitchProgramme, Site
+from .sizes import check_sizes
 from .structure import LumpedMass, Stiffness, Tank, TankSection
 
 CONSTRUCTION_FILE = "construction.toml"

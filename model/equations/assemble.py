@@ -9,7 +9,8 @@ import casadi as ca
 import numpy as np
 
 from ..errors import DataError
-from ..system.linear_system import LinearSystem, Noise, Output, State
+from ..system.labels import Noise, Output, State
+from ..system.linear_system import LinearSystem
 from ..system.symbols import ParameterSymbols, TableSymbols
 from ..tables import TableGroup
 from ..vehicle.columns import MOVED_MODE

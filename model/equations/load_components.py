@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import casadi as ca
 
-from ..system.linear_system import Output
+from ..system.labels import Output
 
 
 def component_columns(modes: int, tanks: Sequence[str], noises: Iterable[str] = ()) -> dict[str, str]:

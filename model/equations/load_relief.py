@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from ..system.linear_system import State
+from ..system.labels import State
 from ..system.symbols import ParameterSymbols, TableSymbols
 from ..vehicle.vehicle_file import SensorFeedbackEntry
 from .control import TransferFunction, transfer_function, transfer_function_symbols

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from numbers import Real
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SystemDefinitionError, UnknownNameError
+from .labels import Noise, Output, Parameter, State
 from .names import COMBINED, unfit
-
-if TYPE_CHECKING:
-    from .linear_system import LinearSystem
 
 ROUNDING = 1e-8  # of a start covariance, relative to its standard deviations
 
@@ -109,91 +107,105 @@ def check_keys(kind: str, given: Mapping[str, object], known: Iterable[str]) -> 
             raise UnknownNameError(kind, str(name), known)
 
 
-def check_labels(system: LinearSystem) -> None:
-    """Refuse names, units and sizes that results and generated code cannot carry.
+def check_labels(system: str, labels: Iterable[tuple[str, str, str]]) -> None:
+    """Refuse names and units that results and generated code cannot carry.
+
+    Parameters
+    ----------
+    system : str
+        Its name.
+    labels : iterable of (kind, name, unit)
 
     Raises
     ------
     SystemDefinitionError
     """
-    where = f"system '{system.name}'"
-    if why := unfit(system.name):
+    if why := unfit(system):
         raise SystemDefinitionError(f"the name of a system {why}; give it a short plain one")
-    labels = [
-        *(("state", s.name, s.unit) for s in system.states),
-        *(("output", o.name, o.unit) for o in system.outputs),
-        *(("parameter", p.name, p.unit) for p in system.parameters),
-        *(("noise", n.name, "1") for n in system.noises),
-        *(("noise source", n.source, "1") for n in system.noises),
-        *(("input", name, "1") for name in system.input_names),
-        *(("table", name, unit) for g in system.tables for name, unit in zip(g.names, g.units, strict=True)),
-    ]
     for kind, name, unit in labels:
         if why := unfit(name):
-            raise SystemDefinitionError(f"{where}: the name of a {kind} {why}; give it a short plain one")
+            raise SystemDefinitionError(f"system '{system}': the name of a {kind} {why}; give it a short plain one")
         if why := unfit(unit, empty=True):
-            raise SystemDefinitionError(f"{where}: the unit of {kind} '{name}' {why}; write it such as 'm/s'")
-    for output in system.outputs:
+            raise SystemDefinitionError(f"system '{system}': the unit of {kind} '{name}' {why}; write it such as 'm/s'")
+
+
+def check_entries(
+    where: str,
+    states: Sequence[State],
+    noises: Sequence[Noise],
+    outputs: Sequence[Output],
+    parameters: Sequence[Parameter],
+) -> None:
+    """Refuse sizes, values and symbols that are none, a source with a reserved name, and a system of nothing.
+
+    Raises
+    ------
+    SystemDefinitionError
+    """
+    for output in outputs:
         if why := unfit(output.symbol, empty=True):
             raise SystemDefinitionError(f"{where}: the symbol of output '{output.name}' {why}")
-    if COMBINED in system.sources:
+    if any(noise.source == COMBINED for noise in noises):
         raise SystemDefinitionError(
             f"{where}: a noise source cannot be called '{COMBINED}', which is the sum over all sources in every "
             "result; rename it"
         )
-    for kind, entry in (*(("state", s) for s in system.states), *(("output", o) for o in system.outputs)):
+    for kind, entry in (*(("state", s) for s in states), *(("output", o) for o in outputs)):
         if not finite_number(f"{where}: the scale of {kind}", entry.name, entry.scale) > 0:
             raise SystemDefinitionError(
                 f"{where}: the scale of {kind} '{entry.name}' is {entry.scale:g}; give a typical size above zero"
             )
-    for parameter in system.parameters:
+    for parameter in parameters:
         finite_number(f"{where}: parameter", parameter.name, parameter.value)
-    finite_number(f"{where}: the time", "start", system.start)
-    if system.end != math.inf:
-        finite_number(f"{where}: the time", "end", system.end)
-    for kind, entries in (("states", system.states), ("outputs", system.outputs)):
+    for kind, entries in (("states", states), ("outputs", outputs)):
         if not entries:
             raise SystemDefinitionError(f"{where} has no {kind}; give one at least")
 
 
-def check_symbols(system: LinearSystem) -> None:
-    """Refuse symbols that are expressions or stand for two things, and calls of functions inside the expressions.
+def check_span(where: str, start: float, end: float) -> None:
+    """Refuse a start that is no time, and an end that is neither a time nor infinity.
 
     Raises
     ------
     SystemDefinitionError
     """
-    groups = (
-        ("time", ("time",), system.time),
-        ("state", system.state_names, system.x),
-        ("noise", system.noise_names, system.w),
-        ("input", system.input_names, system.u),
-        ("parameter", system.parameter_names, system.p),
-        ("table", tuple(name for g in system.tables for name in g.names), system.v),
-    )
+    finite_number(f"{where}: the time", "start", start)
+    if end != math.inf:
+        finite_number(f"{where}: the time", "end", end)
+
+
+def check_symbols(
+    where: str,
+    symbols: Iterable[tuple[str, Sequence[str], ca.SX]],
+    expressions: Iterable[tuple[str, Sequence[str], ca.SX]],
+) -> None:
+    """Refuse symbols that are expressions or stand for two things, and calls of functions inside the expressions.
+
+    Parameters
+    ----------
+    where : str
+        The system, for errors.
+    symbols, expressions : iterables of (kind, names, SX column)
+
+    Raises
+    ------
+    SystemDefinitionError
+    """
     first: dict[int, str] = {}
-    for kind, names, symbols in groups:
+    for kind, names, column in symbols:
         for i, name in enumerate(names):
             label = kind if kind == "time" else f"{kind} '{name}'"
-            symbol = symbols[i]
+            symbol = column[i]
             if not symbol.is_symbolic():
-                raise SystemDefinitionError(
-                    f"system '{system.name}': {label} is the expression {_short(symbol)}, not a symbol"
-                )
+                raise SystemDefinitionError(f"{where}: {label} is the expression {_short(symbol)}, not a symbol")
             other = first.setdefault(symbol.element_hash(), label)
             if other != label:
-                raise SystemDefinitionError(
-                    f"system '{system.name}': one symbol stands for {other} and {label}; make one for each"
-                )
-    for what, expressions, names in (
-        ("derivative of", system.derivative, system.state_names),
-        ("output", system.output, system.output_names),
-        ("input", system.input_values, system.input_names),
-    ):
-        if _calls(expressions):
-            name = next(name for i, name in enumerate(names) if _calls(expressions[i]))
+                raise SystemDefinitionError(f"{where}: one symbol stands for {other} and {label}; make one for each")
+    for what, names, column in expressions:
+        if _calls(column):
+            name = next(name for i, name in enumerate(names) if _calls(column[i]))
             raise SystemDefinitionError(
-                f"system '{system.name}': the {what} '{name}' calls a function (casadi.interpolant, external code), "
+                f"{where}: the {what} '{name}' calls a function (casadi.interpolant, external code), "
                 "which has no C form here; write it with arithmetic, elementary functions and if_else, or make it a "
                 "table of the system"
             )
@@ -204,20 +216,30 @@ def _calls(expression: ca.SX) -> bool:
     return any(function.instruction_id(k) == ca.OP_CALL for k in range(function.n_instructions()))
 
 
-def checked_covariance(system: LinearSystem, source: str, given: Any) -> ca.SX | NDArray[np.float64]:
+def checked_covariance(where: str, states: Sequence[str], p: ca.SX, given: Any) -> ca.SX | NDArray[np.float64]:
     """Return a start covariance as an array, or as an expression of the parameters where it is one.
+
+    Parameters
+    ----------
+    where : str
+        Of which system and source, for errors.
+    states : sequence of str
+        Names.
+    p : SX
+        Symbols of the parameters.
+    given : SX, DM, array or number
 
     Raises
     ------
     SystemDefinitionError
         Shape, values, or symbols that are no parameters.
     """
-    n, where = len(system.states), f"system '{system.name}': the start covariance of '{source}'"
+    n = len(states)
     if isinstance(given, ca.MX):
         raise SystemDefinitionError(f"{where} is an MX expression; write it with the SX symbols of the parameters")
     if isinstance(given, ca.SX) and not given.is_constant():
         matrix: ca.SX | NDArray[np.float64] = given
-        known = {p.element_hash() for p in ca.symvar(system.p)}
+        known = {p.element_hash() for p in ca.symvar(p)}
         for symbol in ca.symvar(given):
             if symbol.element_hash() not in known:
                 raise SystemDefinitionError(
@@ -232,26 +254,33 @@ def checked_covariance(system: LinearSystem, source: str, given: Any) -> ca.SX |
     if tuple(matrix.shape) != (n, n):
         raise SystemDefinitionError(
             f"{where} has the shape {tuple(matrix.shape)}; it is {(n, n)}, a row and a column for each of the states "
-            f"{', '.join(system.state_names[:12])}"
+            f"{', '.join(states[:12])}"
         )
     if isinstance(matrix, np.ndarray):
-        check_covariance(system, source, matrix)
+        check_covariance(where, states, matrix)
     return matrix
 
 
-def check_covariance(system: LinearSystem, source: str, matrix: NDArray[np.float64]) -> None:
+def check_covariance(where: str, states: Sequence[str], matrix: NDArray[np.float64]) -> None:
     """Refuse a matrix that is no covariance.
+
+    Parameters
+    ----------
+    where : str
+        Of which system and source, for errors.
+    states : sequence of str
+        Names.
+    matrix : (n, n) array
 
     Raises
     ------
     SystemDefinitionError
         An entry that is not finite, a negative variance, a matrix that is not symmetric or is indefinite.
     """
-    names, where = system.state_names, f"system '{system.name}': the start covariance of '{source}'"
 
     def entry(bad: NDArray[np.bool_]) -> tuple[str, float]:
         i, j = np.argwhere(bad)[0]
-        return f"'{names[i]}' and '{names[j]}'", float(matrix[i, j])
+        return f"'{states[i]}' and '{states[j]}'", float(matrix[i, j])
 
     if (bad := ~np.isfinite(matrix)).any():
         at, value = entry(bad)
@@ -260,7 +289,7 @@ def check_covariance(system: LinearSystem, source: str, matrix: NDArray[np.float
     if (bad := variance < 0).any():
         i = int(np.argmax(bad))
         raise SystemDefinitionError(
-            f"{where} gives '{names[i]}' the variance {variance[i]:g}; a variance is not negative"
+            f"{where} gives '{states[i]}' the variance {variance[i]:g}; a variance is not negative"
         )
     std = np.sqrt(variance)
     size = np.outer(std, std)

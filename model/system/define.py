@@ -8,7 +8,8 @@ import casadi as ca
 import numpy as np
 
 from .checks import check_keys, finite_number, pair, scalar_expression, scalar_symbol
-from .linear_system import LinearSystem, Noise, Output, Parameter, State
+from .labels import Noise, Output, Parameter, State
+from .linear_system import LinearSystem
 
 
 def define_system(

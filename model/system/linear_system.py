@@ -19,50 +19,17 @@ from ..errors import DirectNoiseError, NonlinearSystemError, SystemDefinitionErr
 from ..tables import TableGroup
 from .checks import (
     check_covariance,
+    check_entries,
     check_keys,
     check_labels,
+    check_span,
     check_symbols,
     checked_covariance,
 )
+from .labels import Noise, Output, Parameter, State
+from .names import COMBINED as COMBINED
 from .switches import switch_times
 from .time_conditions import Condition, Stops, find_conditions, locate
-
-
-@dataclass(frozen=True)
-class State:
-    """A state: its name, unit, and a typical size that the integrators use to weigh errors."""
-
-    name: str
-    unit: str = "1"
-    scale: float = 1.0
-
-
-@dataclass(frozen=True)
-class Noise:
-    """A white-noise input of unit intensity and the source (wind, thrust, ...) that it belongs to."""
-
-    name: str
-    source: str
-
-
-@dataclass(frozen=True)
-class Output:
-    """A response: its name, unit, typical size and, where it has one, the report's symbol."""
-
-    name: str
-    unit: str = "1"
-    scale: float = 1.0
-    symbol: str = ""
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """A number that can be changed without new code."""
-
-    name: str
-    value: float
-    unit: str = "1"
-    description: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,7 +100,10 @@ class LinearSystem:
     structure: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self):
-        check_labels(self)
+        where = f"system '{self.name}'"
+        check_labels(self.name, self._labels())
+        check_entries(where, self.states, self.noises, self.outputs, self.parameters)
+        check_span(where, self.start, self.end)
         sizes = {
             "states": (self.x.numel(), len(self.states), self.derivative.numel()),
             "noises": (self.w.numel(), len(self.noises)),
@@ -158,10 +128,24 @@ class LinearSystem:
             repeated = {n for n in names if names.count(n) > 1}
             if repeated:
                 raise SystemDefinitionError(f"system '{self.name}' has more than one {label} '{repeated.pop()}'")
-        check_symbols(self)
+        symbols = (
+            ("time", ("time",), self.time),
+            ("state", self.state_names, self.x),
+            ("noise", self.noise_names, self.w),
+            ("input", self.input_names, self.u),
+            ("parameter", self.parameter_names, self.p),
+            ("table", tuple(name for g in self.tables for name in g.names), self.v),
+        )
+        expressions = (
+            ("derivative of", self.state_names, self.derivative),
+            ("output", self.output_names, self.output),
+            ("input", self.input_names, self.input_values),
+        )
+        check_symbols(where, symbols, expressions)
         check_keys("noise source", self.start_covariance, self.sources)
         covariance = {
-            source: checked_covariance(self, source, given) for source, given in self.start_covariance.items()
+            source: checked_covariance(self._where(source), self.state_names, self.p, given)
+            for source, given in self.start_covariance.items()
         }
         object.__setattr__(self, "start_covariance", covariance)
         signals = ca.vertcat(self.x, self.w, self.u)
@@ -186,6 +170,21 @@ class LinearSystem:
                         "linearise it about the mean flight"
                     )
         _ = self.conditions
+
+    def _labels(self) -> list[tuple[str, str, str]]:
+        """Return kind, name and unit of everything that has a name."""
+        return [
+            *(("state", s.name, s.unit) for s in self.states),
+            *(("output", o.name, o.unit) for o in self.outputs),
+            *(("parameter", p.name, p.unit) for p in self.parameters),
+            *(("noise", n.name, "1") for n in self.noises),
+            *(("noise source", n.source, "1") for n in self.noises),
+            *(("input", name, "1") for name in self.input_names),
+            *(("table", name, unit) for g in self.tables for name, unit in zip(g.names, g.units, strict=True)),
+        ]
+
+    def _where(self, source: str) -> str:
+        return f"system '{self.name}': the start covariance of '{source}'"
 
     @property
     def state_names(self) -> tuple[str, ...]:
@@ -313,13 +312,10 @@ class LinearSystem:
         if isinstance(given, np.ndarray):
             return given
         found = np.array(ca.Function("p0", [self.p], [ca.densify(given)])(values), dtype=float).reshape(n, n)
-        check_covariance(self, source, found)
+        check_covariance(self._where(source), self.state_names, found)
         return found
 
 
 @lru_cache(maxsize=64)
 def _located(system: LinearSystem, parameters: bytes, end: float) -> Stops:
     return locate(system.conditions, system.discontinuities, np.frombuffer(parameters), system.start, end, system.name)
-
-
-COMBINED = "combined"

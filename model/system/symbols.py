@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import casadi as ca
 
 from ..errors import UnknownNameError
-from .linear_system import Parameter
+from .labels import Parameter
 
 
 class ParameterSymbols:

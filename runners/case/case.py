@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from ...codegen.system.executable import ExecutableSystem, executable_system
 from ...model.equations.assemble import assemble
 from ...model.errors import DataError, NotPicklableError, ParameterValueError, TimeRangeError, UnknownNameError
-from ...model.system.linear_system import LinearSystem, Parameter
+from ...model.system.labels import Parameter
+from ...model.system.linear_system import LinearSystem
 from ...model.tables import table_values
 from ...model.vehicle.coverage import check_wind, loaded_flight
 from ...model.vehicle.reader import load_vehicle

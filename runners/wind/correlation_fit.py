@@ -7,7 +7,6 @@ do not determine it above and below: there its knots stay as near to those of Ma
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,16 +14,13 @@ from scipy.optimize import least_squares
 
 from ...model.tables import Table
 from ...model.wind.range_reference import (
-    KERNELS,
     LAYER,
     LEVELS,
     MONTHS,
-    PERIODS,
     WIND_DATA,
     range_reference,
     read_rows,
 )
-from ...model.wind.record import COMPONENTS
 from ...model.wind.shaping_filter import TwoPartKernel
 
 # March, as reconstructed by hand from the same soundings; the scale factors of other months start here.
@@ -168,21 +164,3 @@ def reconstructed_kernel(period: str, component: str) -> TwoPartKernel:
     table = range_reference(period)
     deviation = Table("sigma", "m/s", table.altitude, table.standard_deviation[component], "pchip")
     return fit_kernel(measured_pairs(period, component), deviation, march_kernel(component))
-
-
-def write_kernels(file: Path = WIND_DATA / KERNELS) -> None:
-    """Write the knots of all months and components, as shipped in model/wind/data."""
-    lines = [
-        "# computed: knots of the two-part kernel by month and component (correlation_fit.py), fitted to level",
-        "# correlations of Cape Canaveral soundings 2008-2022; March by hand; assumed below 1.5 km and above 10.7 km;",
-        "# 'third_order' is March zonal with smoothness 0.5, all others have 0.7; scales in m",
-        "month,component,quantity,altitude [m],value",
-    ]
-    cases = [(p, c) for p in PERIODS for c in COMPONENTS] + [("march", "third_order")]
-    for period, component in cases:
-        kernel = march_kernel(component) if component == "third_order" else reconstructed_kernel(period, component)
-        for quantity, (altitude, values) in zip(
-            QUANTITIES, (kernel.long_scale, kernel.short_scale, kernel.short_fraction), strict=True
-        ):
-            lines += [f"{period},{component},{quantity},{h:g},{v:.6g}" for h, v in zip(altitude, values, strict=True)]
-    file.write_text("\n".join(lines) + "\n", encoding="utf-8")

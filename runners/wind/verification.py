@@ -16,7 +16,8 @@ from scipy.integrate import simpson
 
 from ...codegen.system.executable import executable_system
 from ...model.errors import TimeRangeError
-from ...model.system.linear_system import LinearSystem, Noise, Output, State
+from ...model.system.labels import Noise, Output, State
+from ...model.system.linear_system import LinearSystem
 from ...model.system.symbols import TableSymbols
 from ...model.tables import TableGroup
 from ...model.wind.shaping_filter import ShapingFilter, entry_name

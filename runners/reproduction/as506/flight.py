@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ....model.construction import Construction
-from ....model.construction.as506 import as506
 from ...construct.ascent.mean_flight import EVENT_MARGIN, MeanFlight, fly
+from .construction import as506
 
 SOURCE = "AS-506 flight evaluation report MPR-SAT-FE-69-9"
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ....model.construction import Construction
-from ....model.construction.as506 import as506
 from ...construct.vehicle_numbers import compute_vehicle
+from .construction import as506
 from .flight import SOURCE, FlightCheck
 
 STATION = 25.0  # m

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ....model.construction import Construction
-from ....model.construction.as506 import as506
 from ...construct.mass.properties import mass_properties
+from .construction import as506
 from .flight import SOURCE, FlightCheck
 
 CENTER_OF_GRAVITY_LIMIT = 0.15  # m

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from planar_rows import COLUMNS, planar_rows
 
 from ascentwind.model.construction.planar_equations import planar_motion
 from ascentwind.model.errors import DataError, ParameterValueError
 from ascentwind.model.system.symbols import TableSymbols
 from ascentwind.runners import Study
 from ascentwind.runners.solvers.planar_mean import RESPONSES, planar_mean
-from ascentwind.runners.solvers.planar_rows import COLUMNS, planar_rows
 from ascentwind.runners.solvers.stability import matrices_at
 
 TABLES = {

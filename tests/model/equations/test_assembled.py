@@ -13,7 +13,7 @@ from lagrangian import MODES, TANKS, X_CG, X_S, Y_S, T_mu, derive, inertia, m_S,
 
 from ascentwind.codegen.system.functions import CoreFunctions, core_functions
 from ascentwind.model import LinearSystem, Vehicle, load_vehicle
-from ascentwind.model.equations import assemble
+from ascentwind.model.equations.assemble import assemble
 from ascentwind.model.tables import table_values
 
 VEHICLE = Path(__file__).parents[3] / "model" / "vehicles" / "as504"

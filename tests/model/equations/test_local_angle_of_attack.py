@@ -11,7 +11,7 @@ from test_assembled import VEHICLE, Assembled, NumericEquations, acceleration_ro
 
 from ascentwind.codegen.system.functions import core_functions
 from ascentwind.model import load_vehicle
-from ascentwind.model.equations import assemble
+from ascentwind.model.equations.assemble import assemble
 from ascentwind.model.errors import DataError
 from ascentwind.model.vehicle.columns import local_columns, local_load_columns
 

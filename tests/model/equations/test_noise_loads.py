@@ -13,7 +13,7 @@ from test_assembled import MEAN, Assembled
 from ascentwind.codegen.system.functions import core_functions
 from ascentwind.model import load_vehicle
 from ascentwind.model.construction.construction_file import load_construction
-from ascentwind.model.equations import assemble
+from ascentwind.model.equations.assemble import assemble
 from ascentwind.model.errors import DataError, DirectNoiseError
 from ascentwind.model.files.csv_table import read_csv_table
 from ascentwind.model.vehicle.noise_loads import NoiseLoadsWarning

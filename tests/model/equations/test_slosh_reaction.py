@@ -11,7 +11,7 @@ from test_assembled import TIMES, VEHICLE, Assembled, NumericEquations, accelera
 
 from ascentwind.codegen.system.functions import core_functions
 from ascentwind.model import load_vehicle
-from ascentwind.model.equations import assemble
+from ascentwind.model.equations.assemble import assemble
 
 FORWARD = 22.46
 

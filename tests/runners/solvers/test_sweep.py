@@ -22,7 +22,7 @@ from ascentwind.codegen.sweep.source import sweep_functions, sweep_source
 from ascentwind.codegen.system.executable import executable_system
 from ascentwind.codegen.toolchain.library import NoCompilerError
 from ascentwind.model import load_vehicle
-from ascentwind.model.equations import assemble
+from ascentwind.model.equations.assemble import assemble
 from ascentwind.model.errors import DataError, DirectNoiseError, IntegrationError, TimeRangeError
 from ascentwind.model.system.define import define_system
 from ascentwind.runners.solvers.adjoint import AdjointSolver

@@ -8,8 +8,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ...model.construction.planar_equations import planar_motion
-from ...model.system.symbols import TableSymbols
+from ascentwind.model.construction.planar_equations import planar_motion
+from ascentwind.model.system.symbols import TableSymbols
 
 ROWS = ("forward", "lateral", "rotation", "angle_of_attack")
 COLUMNS = ("forward_speed", "lateral_velocity", "attitude", "engine_angle", "wind")
