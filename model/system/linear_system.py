@@ -73,7 +73,7 @@ class LinearSystem:
     UnknownNameError
         A start covariance for a source that is not there.
     SwitchError
-        If a condition (a comparison, floor, sign, ...) depends on a table.
+        If a condition (a comparison, floor, sign, ...) outside of the outputs depends on a table.
     """
 
     name: str
@@ -241,8 +241,8 @@ class LinearSystem:
     def conditions(self) -> tuple[Condition, ...]:
         """Conditions on time in the expressions: comparisons, floor, sign, fmod, ... of time and parameters."""
         signals = ca.vertcat(self.x, self.w, self.u)
-        expressions = (self.derivative, self.output, self.input_values)
-        return find_conditions(expressions, self.time, self.p, self.v, signals, self.name)
+        integrated = (self.derivative, self.input_values)
+        return find_conditions(integrated, (self.output,), self.time, self.p, self.v, signals, self.name)
 
     def stops(self, parameters: np.ndarray, until: float) -> Stops:
         """Return where integrators stop for given parameters: declared discontinuities and located switches.

@@ -8,7 +8,7 @@ argument has no such level in them or passes it once, so that no pair of switche
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -99,13 +99,20 @@ class Stops:
 
 
 def find_conditions(
-    expressions: Sequence[ca.SX], time: ca.SX, p: ca.SX, tables: ca.SX, signals: ca.SX, system: str
+    expressions: Sequence[ca.SX],
+    outputs: Sequence[ca.SX],
+    time: ca.SX,
+    p: ca.SX,
+    tables: ca.SX,
+    signals: ca.SX,
+    system: str,
 ) -> tuple[Condition, ...]:
     """Return the conditions on time in expressions, inner ones before those that contain them.
 
     Parameters
     ----------
-    expressions : sequence of SX
+    expressions, outputs : sequences of SX
+        Those that are integrated, and those that are only evaluated: a condition on a table stops no integrator there.
     time, p, tables, signals : SX
         Symbols: flight time, parameters, table values, and states, noises and inputs together.
     system : str
@@ -116,49 +123,55 @@ def find_conditions(
     NonlinearSystemError
         If a condition depends on a state, noise or input.
     SwitchError
-        If one depends on a table.
+        If one that is integrated depends on a table.
     """
     depends: dict[int, int] = {}
     for symbols, what in ((time, _TIME), (p, 0), (tables, _TABLE), (signals, _SIGNAL)):
         depends |= {symbol.element_hash(): what for symbol in symbols.elements()}
     found: dict[tuple[int, bool], Condition] = {}
+    for integrated, group in ((True, expressions), (False, outputs)):
+        for e in _unfolded(group, depends):
+            parts = [e.dep(i) for i in range(e.n_dep())]
+            key = e.element_hash()
+            depends[key] = 0
+            for part in parts:
+                depends[key] |= depends[part.element_hash()]
+            for argument, size, whole in _arguments(e, parts):
+                over = 0
+                for symbol in ca.symvar(argument):
+                    over |= depends.get(symbol.element_hash(), 0)
+                if over & _SIGNAL:
+                    raise NonlinearSystemError(
+                        f"system '{system}': the condition '{_text(e)}' depends on a state, noise or input, which is "
+                        "not linear; linearise it about the mean flight"
+                    )
+                if over & _TABLE and integrated:
+                    raise SwitchError(
+                        f"system '{system}': the condition '{_text(e)}' depends on a table, so that the times at which "
+                        "it switches are not known; write it in terms of time and parameters"
+                    )
+                if over & _TIME and not over & _TABLE:
+                    inner = any(depends[part.element_hash()] & _SWITCH for part in parts)
+                    depends[key] |= _SWITCH
+                    at = argument.element_hash(), whole
+                    if at not in found:
+                        found[at] = _condition(_text(e), argument, size, whole, inner, time, p)
+    return tuple(found.values())
+
+
+def _unfolded(expressions: Sequence[ca.SX], done: Mapping[int, int]) -> Iterator[ca.SX]:
+    """Yield every operation in expressions that is not done, after its operands; the caller marks each as done."""
     stack = [element for expression in expressions for element in expression.nonzeros()]
     while stack:
         e = stack[-1]
-        key = e.element_hash()
-        if key in depends:
-            stack.pop()
-            continue
-        parts = [e.dep(i) for i in range(e.n_dep())]
-        missing = [part for part in parts if part.element_hash() not in depends]
+        missing = [] if e.element_hash() in done else [e.dep(i) for i in range(e.n_dep())]
+        missing = [part for part in missing if part.element_hash() not in done]
         if missing:
             stack += missing
             continue
         stack.pop()
-        depends[key] = 0
-        for part in parts:
-            depends[key] |= depends[part.element_hash()]
-        for argument, size, whole in _arguments(e, parts):
-            over = 0
-            for symbol in ca.symvar(argument):
-                over |= depends.get(symbol.element_hash(), 0)
-            if over & _SIGNAL:
-                raise NonlinearSystemError(
-                    f"system '{system}': the condition '{_text(e)}' depends on a state, noise or input, which is not "
-                    "linear; linearise it about the mean flight"
-                )
-            if over & _TABLE:
-                raise SwitchError(
-                    f"system '{system}': the condition '{_text(e)}' depends on a table, so that the times at which it "
-                    "switches are not known; write it in terms of time and parameters"
-                )
-            if over & _TIME:
-                inner = any(depends[part.element_hash()] & _SWITCH for part in parts)
-                depends[key] |= _SWITCH
-                at = argument.element_hash(), whole
-                if at not in found:
-                    found[at] = _condition(_text(e), argument, size, whole, inner, time, p)
-    return tuple(found.values())
+        if e.element_hash() not in done:
+            yield e
 
 
 def _arguments(e: ca.SX, parts: list[ca.SX]) -> list[tuple[ca.SX, ca.SX, bool]]:

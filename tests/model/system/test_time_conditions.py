@@ -12,11 +12,13 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
+from scipy.interpolate import PPoly
 from switched_system import NOMINAL, pieces, switched_system
 
 from ascentwind.model import LinearSystem, define_system
 from ascentwind.model.errors import IntegrationError, NonlinearSystemError, SwitchError
 from ascentwind.model.system.interval_arithmetic import bounds
+from ascentwind.model.tables import TableGroup
 from ascentwind.runners import CovarianceOptions, IntegratorOptions, Study, SweepOptions
 from ascentwind.runners.solvers.discretisation import discretise
 from ascentwind.runners.statistics.engines import ENGINES, UncheckedStatisticsWarning
@@ -244,3 +246,18 @@ def test_a_hundred_switches_a_second():
     for engine in ("sweep", "cvodes"):
         found = study.response_statistics([3.0], engine=engine).variance.values[0, 0, 0]
         assert found == pytest.approx(1e4 * sum(inside), rel=1e-5), engine
+
+
+def test_a_condition_on_a_table_stands_in_outputs_alone():
+    """y = h(t) x, h = 2 where a table exceeds 2, else 1: nothing is integrated over it."""
+    x, n, v = ca.SX.sym("x"), ca.SX.sym("n"), ca.SX.sym("v")
+    table = TableGroup.from_polynomials(
+        "height", "time", (("height", "m", PPoly(np.array([[1.0], [0.0]]), np.array([0.0, 9.0]))),), 0.0, 9.0
+    )
+    above = define_system("above", time=T, states={"x": (x, -x + n)}, noises={"n": n}, outputs={"x": x}, end=9.0)
+    system = replace(above, v=v, tables=(table,), output=(1 + (v > 2.0)) * x)
+    assert not system.conditions
+    for engine, (variance, _) in by_every_engine(Study.from_system(system), [1.5, 3.0]).items():
+        assert variance == pytest.approx([(1 - np.exp(-3)) / 2, 2 * (1 - np.exp(-6))], rel=1e-7), engine
+    with pytest.raises(SwitchError, match="depends on a table"):
+        replace(system, derivative=-x + (v > 2.0) * n)
