@@ -172,21 +172,24 @@ def test_what_a_kill_left_in_the_cache_is_removed(own_cache):
     for path in (*left, held, new):
         path.mkdir() if path.suffix == ".work" else path.write_text("")
     (left[0] / "system.c").write_text("half")
+    long_ago = time.time() - 7200
     for path in (*left, held):
-        os.utime(path, (time.time() - 7200,) * 2)
+        os.utime(path, (long_ago, long_ago))
     kept = {p.name for p in own_cache.iterdir()} - {p.name for p in left}
     with FileLock(held):
-        os.utime(held, (time.time() - 7200,) * 2)
+        os.utime(held, (long_ago, long_ago))
         assert remove_leftovers(own_cache) == len(left)
     assert {p.name for p in own_cache.iterdir()} == kept
-    assert not executable_system(lag()).shared_library.fresh
+    library = executable_system(lag()).shared_library
+    assert library is not None and not library.fresh
 
 
 def test_compiling_removes_what_is_left(own_cache):
     cache_folder()
     left = own_cache / "gone-1.abc.work"
     left.mkdir()
-    os.utime(left, (time.time() - 7200,) * 2)
+    long_ago = time.time() - 7200
+    os.utime(left, (long_ago, long_ago))
     executable_system(lag())
     assert not left.exists()
 
@@ -205,7 +208,8 @@ def test_cache_is_shown_and_cleaned(own_cache):
         assert "0 compiled libraries" in " ".join(cleaned.output.split())
         assert sorted(p.name for p in own_cache.iterdir()) == ["busy.abc.work", "busy.lock"]
     assert clean_cache(own_cache) == 2
-    assert executable_system(lag()).shared_library.fresh
+    library = executable_system(lag()).shared_library
+    assert library is not None and library.fresh
 
 
 def test_what_a_kill_left_in_results_is_removed(tmp_path):

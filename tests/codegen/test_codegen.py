@@ -18,9 +18,9 @@ from ascentwind.codegen.system.executable import InterpreterWarning, difference_
 from ascentwind.codegen.system.functions import core_functions
 from ascentwind.codegen.system.source import c_source
 from ascentwind.codegen.toolchain.c_printer import UnsupportedOperationError, c_function
-from ascentwind.codegen.toolchain.cache import CacheError, CacheWarning, cache_folder, describe_changes
+from ascentwind.codegen.toolchain.cache import CacheError, CacheWarning, CompiledLibrary, cache_folder, describe_changes
 from ascentwind.codegen.toolchain.compiler import CompilerError, find_compiler
-from ascentwind.model import define_system
+from ascentwind.model import LinearSystem, define_system
 from ascentwind.runners import Study
 
 
@@ -29,6 +29,12 @@ def lag(name: str = "lag", gain: float = 1.0):
     return define_system(
         name, time=t, states={"x": (x, -k * x + n)}, noises={"n": n}, outputs={"x": x}, parameters={"k": (k, gain)}
     )
+
+
+def loaded(system: LinearSystem) -> CompiledLibrary:
+    library = executable_system(system).shared_library
+    assert library is not None
+    return library
 
 
 @pytest.fixture
@@ -54,6 +60,7 @@ def test_interpreted_splines_equal_the_lookup(as504):
 def test_jacobian_for_the_implicit_method_is_the_derivative(as504):
     """jac_adjoint and jac_mean, which CVODES uses, against differences of the linear integrands."""
     executable = as504.with_means
+    assert executable.shared_library is not None
     path = str(executable.shared_library.path)
     parameters = executable.integrator_parameters(80.0, 20.0, 10.0, 105.0)
     for name in ("adjoint", "mean"):
@@ -98,10 +105,10 @@ def test_source_holds_structure_only(as504, edit):
 
 
 def test_second_load_takes_the_library_from_the_cache(own_cache):
-    first, second = executable_system(lag()), executable_system(lag(gain=3.0))
-    assert first.shared_library.fresh
-    assert not second.shared_library.fresh
-    assert first.shared_library.path == second.shared_library.path
+    first, second = loaded(lag()), loaded(lag(gain=3.0))
+    assert first.fresh
+    assert not second.fresh
+    assert first.path == second.path
     assert stat.S_IMODE(own_cache.stat().st_mode) == 0o700
 
 
@@ -115,11 +122,11 @@ def test_regeneration_says_what_changed(own_cache, caplog):
 
 
 def test_damaged_library_is_set_aside_and_made_again(own_cache):
-    library = executable_system(lag()).shared_library
+    library = loaded(lag())
     library.path.write_bytes(library.path.read_bytes()[:-100])
     with pytest.warns(CacheWarning, match="is damaged"):
         again = executable_system(lag())
-    assert again.shared_library.fresh
+    assert again.shared_library is not None and again.shared_library.fresh
     assert list(own_cache.glob("*.damaged-*"))
     assert difference_from_core(again) <= 1e-12
 

@@ -157,6 +157,7 @@ def _difference(name: str, folder: Path) -> float:
     """Return how far a changed vehicle's statistics are from the shipped one's, relative; 1 for another structure."""
     usual, statistics, _ = _usual(name)
     study = Study.load(folder, compile=False)
+    assert study.vehicle is not None
     if study.system.structure == usual.system.structure:
         study = Study.from_vehicle(study.vehicle)  # the same code, from the cache
         times = _times(usual)

@@ -28,7 +28,7 @@ def lag() -> Study:
     )
 
 
-def closed_form(time: float, tau=TAU, gain=GAIN, level=INPUT) -> tuple[np.ndarray, np.ndarray]:
+def closed_form(time: float | np.ndarray, tau=TAU, gain=GAIN, level=INPUT) -> tuple[np.ndarray, np.ndarray]:
     """Return mean and standard deviation."""
     variance = np.square(gain) * tau / 2 * (1 - np.exp(-2 * time / tau))
     return gain * level * tau * (1 - np.exp(-time / tau)), np.sqrt(variance)

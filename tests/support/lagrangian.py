@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 import sympy as sp
 
@@ -25,9 +26,10 @@ Y_E = sp.symbols(f"Y1:{MODES + 1}_E")
 segment_slope, segment_x = sp.symbols("c_a c_b"), sp.symbols("x_a x_b")
 Y_segment = sp.Matrix(MODES, 2, lambda i, j: sp.Symbol(f"Y{i + 1}_{'ab'[j]}"))
 
-coordinates = sp.Matrix([lateral, phi, *eta, *xi])
-rates = sp.Matrix([sp.Symbol(f"d{q}") for q in coordinates])
-accelerations = sp.Matrix([sp.Symbol(f"dd{q}") for q in coordinates])
+# typed loosely: SymPy does not say that an element of a vector is an expression
+coordinates: Any = sp.Matrix([lateral, phi, *eta, *xi])
+rates: Any = sp.Matrix([sp.Symbol(f"d{q}") for q in coordinates])
+accelerations: Any = sp.Matrix([sp.Symbol(f"dd{q}") for q in coordinates])
 rest = {s: 0 for s in (*coordinates, *rates, alpha, beta)}
 
 

@@ -104,6 +104,7 @@ def speed(study: Study, time: float) -> float:
 
 def test_linear_mean_is_that_of_the_assembled_model_without_bending_and_slosh():
     rigid = Study.load("as504", compile=False, changes={"bending": [], "slosh": [], "loads": []})
+    assert rigid.vehicle is not None
     found = planar_mean(rigid.vehicle, rigid.executable)
     group = next(g for g in rigid.with_means.groups if g.name == "mean")
     for i, name in enumerate(RESPONSES):
@@ -133,6 +134,7 @@ def test_mean_flight_of_as504_is_nearly_linear(as504):
 
 def test_nonlinear_mean_is_a_choice(as504):
     study = Study.load("as504", changes={"options.mean_response": "nonlinear"})
+    assert study.vehicle is not None
     found = planar_mean(study.vehicle, study.executable)
     k = int(np.argmin(abs(found.times - 75.0)))
     for i, name in enumerate(RESPONSES):
@@ -158,6 +160,6 @@ def test_unstable_mean_flight_names_its_time(as504):
     study = as504.with_parameters({"control.T1.gain": -1.0})
     with pytest.raises(DataError, match=r"the mean flight is unstable.*control law") as caught:
         planar_mean(study.vehicle, study.executable)
-    assert 10 < caught.value.time < 60
+    assert caught.value.time is not None and 10 < caught.value.time < 60
     angles = [abs(float(a)) for a in re.findall(r"(-?\d+) deg", str(caught.value))]
     assert 45 <= max(angles) < 60  # told when it begins, not when it tumbles

@@ -98,7 +98,7 @@ def test_all_errors_of_a_vehicle_are_told_at_once(vehicle_folder):
     toml.write_text(spoiled.replace("full_coupling", "full_copling", 1))
     with pytest.raises(SeveralDataErrors) as caught:
         load_vehicle(vehicle_folder)
-    columns = [error.column for error in caught.value.errors]
+    columns = [str(error.column) for error in caught.value.errors]
     assert sorted(columns) == sorted(["start_tim_s", "options.full_copling", "slosh.0.damping"])
     toml.write_text(whole.replace('["center_of_pressure"]', '["center_of_pressure", "center_of_pressure"]'))
     for name, old, new in (

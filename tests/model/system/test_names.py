@@ -79,7 +79,9 @@ def test_text_of_a_user_stays_in_its_comment(text, cache):
 
 
 def _without_comments(source: str) -> str:
-    command = [*find_compiler().command, "-std=c99", "-fpreprocessed", "-dD", "-E", "-P", "-x", "c", "-"]
+    compiler = find_compiler()
+    assert compiler is not None
+    command = [*compiler.command, "-std=c99", "-fpreprocessed", "-dD", "-E", "-P", "-x", "c", "-"]
     return subprocess.run(command, input=source, capture_output=True, text=True, check=True).stdout
 
 
@@ -303,7 +305,9 @@ def test_without_noises_every_engine_gives_the_mean_alone():
 def test_loaded_library_is_the_named_one(cache):
     """A library's file is its name, made fit for a file, and the hash of its content."""
     study = Study.from_system(lag(name="../above"))
-    path = study.executable.shared_library.path
+    library = study.executable.shared_library
+    assert library is not None
+    path = library.path
     assert path.parent == cache and ".." not in path.name and "above" in path.name
     ctypes.CDLL(str(path))
 

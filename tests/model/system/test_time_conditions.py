@@ -225,7 +225,7 @@ def test_bounds_hold_what_they_bound(seed):
 
 def test_a_check_that_fails_does_not_cost_the_result(monkeypatch):
     """The difference is infinite, with a warning that says why."""
-    study = Study.from_system(driven_by(lambda t: 1.0))
+    study = Study.from_system(driven_by(lambda t: ca.SX(1.0)))
     expected = study.response_statistics([2.0]).std
 
     def fail(options, flight):

@@ -108,6 +108,7 @@ def test_report_sigma_is_an_option(edit, as504_closed_form):
     edit('synthesis = "fitted"', 'synthesis = "closed_form"')
     study = Study.load(edit('standard_deviation = "table"', 'standard_deviation = "cr103010_fit"'), compile=False)
     for s, sigma in ((study, float(report_standard_deviation(10000.0))), (as504_closed_form, 14.54)):
+        assert s.vehicle is not None
         _, _, H = s.vehicle.wind.shaping_filter.at(10000.0)
         P = np.diag([1.0, 3.0, 1.0])
         assert np.sqrt(H @ P @ H) == pytest.approx(sigma, rel=1e-4)

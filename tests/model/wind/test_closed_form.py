@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import itertools
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -36,7 +37,8 @@ def kernel(vehicle) -> TwoPartKernel:
     """The kernel of the vehicle's own file."""
     knots = vehicle.file.wind.correlation
     profiles = (knots.long_scale_m, knots.short_scale_m, knots.short_fraction)
-    return TwoPartKernel(*((np.array(p.altitude_m), np.array(p.value)) for p in profiles))
+    long, short, fraction = ((np.array(p.altitude_m), np.array(p.value)) for p in profiles)
+    return TwoPartKernel(long, short, fraction)
 
 
 def warp(knots, h):
@@ -117,7 +119,8 @@ def test_appendix_e_holds_for_the_homogeneous_filter():
     C2, C3 = (sp.Function(n)(height) for n in ("C2", "C3"))
     climb, g = sp.Function("h")(t), sp.Function("g")
     z, v = g(climb), climb.diff(t)
-    g_h, g_hh = (g(height).diff(height, n).subs(height, climb) for n in (1, 2))
+    derivatives: list[Any] = [g(height).diff(height, n).subs(height, climb) for n in (1, 2)]
+    g_h, g_hh = derivatives
     R2, R3 = v.diff(t) / v + v * C2.subs(height, climb), v**2 * C3.subs(height, climb)
     residual = z.diff(t, 2) - R2 * z.diff(t) - R3 * z
     law = v**2 * (g_hh - C2.subs(height, climb) * g_h - C3.subs(height, climb) * g(climb))

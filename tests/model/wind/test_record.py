@@ -65,6 +65,7 @@ def test_shipped_vehicles_hold_one_wind_and_load_without_a_word(name):
     wind = vehicle.wind
     assert wind.record is not None
     assert wind.record.origin == wind.shaping_filter.origin
+    assert wind.standard_deviation is not None
     h = np.linspace(3.0, 30000.0, 61)
     assert standard_deviation(wind.shaping_filter, h) == pytest.approx(wind.standard_deviation.polynomial(h), rel=1e-3)
 
@@ -277,6 +278,7 @@ def test_the_command_writes_filter_mean_deviation_and_record_of_one_wind(falcon)
     assert "no longer used: wind_march_meridional.csv, wind_march_meridional_filter.json" in found.output
     vehicle = quiet(falcon)
     record = vehicle.wind.record
+    assert record is not None
     assert record.origin == WindOrigin("Cape Canaveral", "meridional", "february", "2006")
     assert (record.azimuth, record.sign, record.held_above) == (pytest.approx(np.pi / 2), 1, 30000.0)
     table = range_reference("february", "2006")
@@ -390,6 +392,7 @@ def test_wind_of_soundings_carries_their_site_and_days(falcon, no_fit, tmp_path)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # a lag between levels 2 km apart is no fit
         record = load_vehicle(falcon).wind.record
+    assert record is not None
     assert record.origin == WindOrigin("Omelek", "meridional", "2003-01-01 to 2003-01-31", "soundings of omelek.csv")
 
 

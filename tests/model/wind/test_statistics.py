@@ -141,6 +141,7 @@ def test_soundings_give_their_statistics_and_independent_samples(tmp_path):
     both = soundings.statistics("mine")
     assert both.zonal.mean == pytest.approx([5, 5, 5], abs=0.3)
     assert both.zonal.standard_deviation == pytest.approx([3, 3, 3], rel=0.05)
+    assert both.cross_correlation is not None
     assert np.abs(both.cross_correlation).max() < 0.1
     assert day_to_day_correlation(soundings.u, soundings.day) == pytest.approx([0.6] * 3, abs=0.05)
     # first-order process of 0.6: (1 - .36) / (1 + .36) of the profiles
@@ -156,7 +157,7 @@ def test_variance_of_a_persistent_process_is_as_uncertain_as_said():
     spread = np.var(np.mean(x**2, axis=1))
     effective = n * (1 - r**2) / (1 + r**2)
     assert spread == pytest.approx(2 / effective, rel=0.1)
-    assert independent_samples(x[0][:, None], np.arange(n)) == pytest.approx(effective, rel=0.5)
+    assert independent_samples(x[0][:, None], np.arange(float(n))) == pytest.approx(effective, rel=0.5)
 
 
 @pytest.mark.parametrize(

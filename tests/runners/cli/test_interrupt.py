@@ -156,11 +156,12 @@ def test_flag_reaches_what_the_threads_call():
             time.sleep(0.001)
         return -1
 
-    begun = threading.Event()
+    begun, futures = threading.Event(), []
     with pytest.raises(ZeroDivisionError), Workers(1) as pool:
-        running, waiting = pool.submit(call, compiled), pool.submit(call, compiled)
+        futures += [pool.submit(call, compiled), pool.submit(call, compiled)]
         begun.wait()
         raise ZeroDivisionError
+    running, waiting = futures
     assert waiting.cancelled()
     with pytest.raises(KeyboardInterrupt):
         running.result()

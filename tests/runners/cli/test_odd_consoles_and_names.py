@@ -25,7 +25,7 @@ def command(monkeypatch, tmp_path, capsys):
             main()
         printed = capsys.readouterr()
         assert "Traceback" not in printed.err
-        return stop.value.code or 0, printed.out, printed.err
+        return int(stop.value.code or 0), printed.out, printed.err
 
     return run
 

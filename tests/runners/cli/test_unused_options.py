@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 import typer
+from typer.core import TyperGroup
 from typer.testing import CliRunner
 
 from ascentwind.model.errors import AscentwindError
@@ -100,9 +101,10 @@ def test_every_option_was_looked_at():
     def options(command) -> set[str]:
         return {p.name for p in command.params if p.param_type_name == "option"} - {"help"}
 
-    found = {}
-    for name, command in typer.main.get_command(app).commands.items():
-        if hasattr(command, "commands"):
+    found, whole = {}, typer.main.get_command(app)
+    assert isinstance(whole, TyperGroup)
+    for name, command in whole.commands.items():
+        if isinstance(command, TyperGroup):
             found |= {f"{name} {inner}": options(c) for inner, c in command.commands.items()}
         else:
             found[name] = options(command)

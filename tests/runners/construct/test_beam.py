@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.linalg import expm
-from scipy.optimize import brentq
+from scipy.optimize import root_scalar
 from small_construction import small_construction
 from threadpoolctl import threadpool_info, threadpool_limits
 
@@ -55,12 +55,13 @@ def timoshenko(shear: float, radius: float, low: float, high: float) -> float:
         )
         return float(np.linalg.det(expm(a * LENGTH)[2:, :2]))
 
-    return brentq(determinant, low, high, xtol=1e-10)
+    return float(root_scalar(determinant, bracket=(low, high), method="brentq", xtol=1e-10).root)
 
 
 def test_uniform_euler_beam():
     """cos x cosh x = 1; shape at the middle of the first mode -0.6078 of the end (Blevins, table 8-1)."""
-    roots = [brentq(lambda x: np.cos(x) - 1 / np.cosh(x), *b) for b in ((4.5, 5.0), (7.5, 8.2), (10.5, 11.5))]
+    brackets = ((4.5, 5.0), (7.5, 8.2), (10.5, 11.5))
+    roots = [root_scalar(lambda x: np.cos(x) - 1 / np.cosh(x), bracket=b, method="brentq").root for b in brackets]
     exact = np.array(roots) ** 2 / LENGTH**2 * np.sqrt(BENDING * LENGTH / MASS)
     found = modes_of(uniform(1e14, 0.0), 3)
     np.testing.assert_allclose(found.frequency, exact, rtol=1e-3)

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq
+from scipy.optimize import root_scalar
 from scipy.special import jvp
 from small_construction import small_construction
 
@@ -21,7 +21,7 @@ DENSITY, RADIUS = 900.0, 1.3
 UPRIGHT = Tank("can", (TankSection("cylinder", 4.0, 20.0, RADIUS),), DENSITY, 1000.0, True)
 SPHERE = Tank("ball", (TankSection("ellipsoid", 4.0, 6.0, 1.0, center=5.0, semi_axis=1.0),), DENSITY, 1000.0, True)
 ENGINES = (replace(small_construction().engines[0], draws={}, residual={}),)
-ROOT = brentq(lambda k: float(jvp(1, k)), 1.5, 2.0, xtol=1e-15)
+ROOT = float(root_scalar(lambda k: float(jvp(1, k)), bracket=(1.5, 2.0), method="brentq", xtol=1e-15).root)
 
 
 def exact_cylinder(depth, acceleration):

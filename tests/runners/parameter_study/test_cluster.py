@@ -8,6 +8,7 @@ import signal
 import socket
 import sys
 import time
+from typing import Any
 
 import numpy as np
 import pytest
@@ -88,7 +89,8 @@ def test_a_member_that_kills_its_worker_costs_no_other(as504, workers, monkeypat
 def test_a_worker_killed_from_outside_is_replaced(as504, workers, tmp_path):
     with Client(workers.scheduler_address, set_as_default=False) as client:
         client.run_on_scheduler(lambda dask_scheduler: setattr(dask_scheduler, "allowed_failures", 3))
-        victim = next(iter(client.run(os.getpid).values()))
+        processes: Any = client.run(os.getpid)
+        victim = next(iter(processes.values()))
     killed = []
 
     def kill(done: int, total: int) -> None:
@@ -159,8 +161,9 @@ def test_what_is_no_address_is_refused_at_once(as504, tmp_path, address, why):
 
 def test_a_scheduler_without_workers(as504, tmp_path, monkeypatch):
     monkeypatch.setattr(cluster, "CONNECT_SECONDS", 1.0)
+    empty = LocalCluster(n_workers=0, processes=False, dashboard_address=":0")
     with (
-        LocalCluster(n_workers=0, processes=False, dashboard_address=":0") as empty,
+        empty,
         pytest.raises(SchedulerError, match=r"has had no workers for 1 s; start some with 'dask worker tcp|inproc"),
     ):
         run_parameter_study(PLAN, tmp_path, study=as504, scheduler=empty.scheduler_address)

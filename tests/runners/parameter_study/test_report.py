@@ -14,6 +14,7 @@ import pytest
 import xarray as xr
 from lag import GAIN, INPUT, TAU, closed_form, dispersion, lag, normal, plan
 from matplotlib.figure import Figure
+from matplotlib.patches import StepPatch
 from rich.console import Console
 from scipy import stats
 
@@ -141,6 +142,7 @@ def test_histogram_shows_members_and_first_order(dispersed):
     )  # fmt: skip
     peak = np.sort(upper(dispersed.stored).max(axis=1))
     (bars,) = figure.axes[0].patches
+    assert isinstance(bars, StepPatch)
     heights, edges, _ = bars.get_data()
     np.testing.assert_allclose(heights, np.histogram(peak, bins=edges, density=True)[0], rtol=1e-9)
     at = found.sel(measure="peak", response="x")
@@ -163,10 +165,12 @@ def test_band_shows_percentiles_over_time(dispersed):
     mean, std = closed_form(times)
     np.testing.assert_allclose(line(figure, "nominal")[1], mean + 3 * std, rtol=1e-6)
     for collection, percents in zip(figure.axes[0].collections, ((1, 99), (5, 95)), strict=False):
-        corners = collection.get_paths()[0].vertices[:, 1]
+        corners = np.asarray(collection.get_paths()[0].vertices)[:, 1]
         ends = np.percentile(values, percents, axis=0)
         assert (corners.min(), corners.max()) == pytest.approx((ends.min(), ends.max()))
-    named = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+    legend = figure.axes[0].get_legend()
+    assert legend is not None
+    named = [text.get_text() for text in legend.get_texts()]
     assert named == ["1 to 99 %", "5 to 95 %", "median", "nominal", "5 to 95 %, first order"]
 
 
@@ -186,7 +190,7 @@ def test_unstable_members_leave_tables_and_figures_readable(study, tmp_path):
     low, high = figures[0].axes[0].get_xlim()
     assert high - low < 1.1 * (np.ptp(peak[status == 0]) + 10 * first_order)
     (bars,) = figures[0].axes[0].patches
-    assert f"{(status != 2).sum()} members, {(status == 1).sum()} beyond the axis" in bars.get_label()
+    assert f"{(status != 2).sum()} members, {(status == 1).sum()} beyond the axis" in str(bars.get_label())
     mean, std = closed_form(3.0)
     assert figures[1].axes[0].get_ylim()[1] < 1.2 * (mean + 3 * std)
 
@@ -241,8 +245,9 @@ def test_tornado_bars_are_the_changes(swept):
     names = [text.get_text() for text in axes.get_yticklabels()]
     assert names == ["gain\n2 … 4.5", "tau\n-5 … 2.2", "level\n1.4 … 1.6"]  # the largest on top
     low, high = ([bar.get_width() for bar in container] for container in axes.containers)
-    tau = sum(np.array(closed_form(3.0, 2.2)) * (1, 3)) - peak
     level = mean * 0.1 / INPUT
+    mean, std = closed_form(3.0, 2.2)
+    tau = mean + 3 * std - peak
     np.testing.assert_allclose(low, [peak * (2.0 / GAIN - 1), 0.0, -level], rtol=1e-5, atol=1e-9)
     np.testing.assert_allclose(high, [peak * (4.5 / GAIN - 1), tau, level], rtol=1e-5)
     assert [t.get_text() for t in axes.texts] == ["", "unstable at the low value", ""]
@@ -274,8 +279,8 @@ def test_grids_are_shown_at_their_values(study, tmp_path):
     assert "peak |mean| + 3σ x (1)" in labelled(figure)
     assert line(figure, "nominal").ravel().tolist() == [GAIN, TAU]
     (contours,) = figure.axes[0].collections
-    highest = [path for path in contours.get_paths() if len(path.vertices)][-1]
-    assert [4.0, 3.0] in highest.vertices.tolist()  # where gain and tau are largest
+    corners = [np.asarray(path.vertices).tolist() for path in contours.get_paths()]
+    assert [4.0, 3.0] in [found for found in corners if found][-1]  # where gain and tau are largest
     points = {tuple(p) for p in line(figure, "computed").T.tolist()}
     assert points == {(4.0, 1.0), (4.0, 3.0), (2.0, 1.0), (2.0, 3.0)}
 

@@ -124,7 +124,7 @@ def made_up(as504) -> Reproduction:
     ]
     check = FlightCheck("altitude", "km", 65.0, 66.1, 1.0, "table 4-2")
     predictions = [Prediction(BY_NAME["peak_mean"], 10e6), Prediction(BY_NAME["rise_attack"], 0.005)]
-    forms = dict.fromkeys(NOISE_LOADS, here)
+    forms: dict[str, Responses] = dict.fromkeys(NOISE_LOADS, here)
     wind = MeanWind(1.5, 3.38, 10500.0, forms, forms, WindRatio("March 1983", 2.5, 37.0), WindRatio("May", 2.6, 38.0))
     return Reproduction(predictions, effects, WindComparison({"own": statistics}, -0.07), [check], calibration, wind)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -144,7 +146,7 @@ def test_at_the_peak_the_derivative_is_that_of_the_maximum():
     """Against differences of the maximum over time of the closed form, its time found by another optimiser."""
 
     def largest(**p):
-        best = minimize_scalar(
+        best: Any = minimize_scalar(
             lambda t: -driven_mean(t, **p) - 3 * driven_std(t, **p), bounds=(0.5, 4), options={"xatol": 1e-10}
         )
         return -best.fun, best.x

@@ -15,6 +15,7 @@ import pytest
 import xarray as xr
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from matplotlib.text import Annotation
 from rich.console import Console
 
 from ascentwind.model import define_system
@@ -123,6 +124,7 @@ def of_figure(study: Study, folder: Path, ascentwind) -> list[float]:
     notes = []
     for name in found["response"].values:
         (note,) = response_figure(found, str(name), "title").axes[0].texts
+        assert isinstance(note, Annotation)
         said = re.fullmatch(r"\|mean\| \+ 3σ: (\S+) (?:MN m|deg) at (\S+) s", note.get_text())
         assert said
         notes += [float(said[1]), float(said[2]), abs(note.xy[1])]

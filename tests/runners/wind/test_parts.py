@@ -99,26 +99,26 @@ def test_bad_turbulence(arguments, error, says):
 
 def test_two_components_have_the_intralevel_correlation():
     both = shipped_two_components()
-    filters = [synthesise(s).shaping_filter for s in (both.zonal, both.meridional)]
+    zonal, meridional = (synthesise(s).shaping_filter for s in (both.zonal, both.meridional))
     deviations = (both.zonal.standard_deviation, both.meridional.standard_deviation)
     h = both.zonal.altitude
-    r, start = fit_noise_correlation(*filters, h, both.intralevel_correlation, deviations)
-    found = cross_covariance(*filters, r, h, start) / (deviations[0] * deviations[1])
+    r, start = fit_noise_correlation(zonal, meridional, h, both.intralevel_correlation, deviations)
+    found = cross_covariance(zonal, meridional, r, h, start) / (deviations[0] * deviations[1])
     # at the surface exactly; above, 80 samples give +-.18
     assert found[0] == pytest.approx(both.intralevel_correlation[0], abs=1e-12)
     assert found == pytest.approx(both.intralevel_correlation, abs=0.03)
     # a second road: the two as one filter, simulated
-    joint = add_filters(*filters, r, start)
+    joint = add_filters(zonal, meridional, r, start)
     u, v = (_seen(joint, range(i, i + 3)) for i in (0, 3))
     levels = h[[0, 5, 12]]
     a, b = (simulate_profiles(f, levels, 20000, seed=7) for f in (u, v))
     at = [0, 5, 12]
     assert np.mean(a * b, axis=0) / (deviations[0] * deviations[1])[at] == pytest.approx(found[at], abs=0.03)
     # in a plane: var(a u + b v) at the surface, with weights of either sign
-    models = [WindModel(s.mean_table(), f) for s, f in zip((both.zonal, both.meridional), filters, strict=True)]
+    winds = WindModel(both.zonal.mean_table(), zonal), WindModel(both.meridional.mean_table(), meridional)
     for azimuth in (np.radians(72.0), np.radians(108.0)):
         x, y = plane_weights(azimuth, "yaw")
-        total = wind_in_plane(*models, azimuth, noise_correlation=r, start_correlation=start)
+        total = wind_in_plane(*winds, azimuth, noise_correlation=r, start_correlation=start)
         su, sv = deviations[0][0], deviations[1][0]
         wanted = (x * su) ** 2 + (y * sv) ** 2 + 2 * x * y * su * sv * start
         assert standard_deviation(total.shaping_filter)[0] ** 2 == pytest.approx(wanted, rel=1e-9)

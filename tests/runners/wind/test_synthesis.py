@@ -183,7 +183,7 @@ def test_too_few_altitudes_and_singular_covariances():
         shipped_statistics().between(500, 900)
     with pytest.raises(FitError, match="positive"):
         FitOptions(time_limit=0)
-    h = np.arange(6) * 1000.0
+    h = np.linspace(0.0, 5000.0, 6)
     same = WindStatistics("one wind", h, np.zeros(6), np.full(6, 5.0), np.ones((6, 6)))
     with pytest.raises(SynthesisError, match="singular"):
         synthesise(same, "impulse-response")
@@ -220,7 +220,7 @@ def test_simulated_profiles_repeat_with_their_seed():
 def test_unstable_filter_is_seen():
     n = 5
     F = np.full((n, 1, 1), 1e-4)
-    f = ShapingFilter("unstable", np.arange(n) * 1000.0, F, np.ones((n, 1, 1)), np.ones((n, 1)), np.eye(1))
+    f = ShapingFilter("unstable", np.linspace(0.0, 4000.0, n), F, np.ones((n, 1, 1)), np.ones((n, 1)), np.eye(1))
     assert largest_pole(f) == pytest.approx(1e-4)
 
 
@@ -252,7 +252,7 @@ def test_any_coefficients_of_the_state_space_form_are_strictly_stable(order, noi
 
 def test_frozen_poles_between_the_samples():
     """Stable at every sample, unstable in between: the finer grid sees it."""
-    h = np.arange(5) * 100.0
+    h = np.linspace(0.0, 400.0, 5)
     a = np.array([-1.0, -0.05, -0.05, -1.0, -1.0]) * 1e-3
     f = ShapingFilter("f", h, a[:, None, None], np.ones((5, 1, 1)), np.ones((5, 1)), np.eye(1))
     between = max(float(f.at(x)[0][0, 0]) for x in np.arange(0, 400.1, 0.5))
