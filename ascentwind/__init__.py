@@ -1,12 +1,24 @@
 """Wind response statistics of ascending launch vehicles by the method of adjoint systems; every public name is here.
 
-Names are imported when first used, so that ``import ascentwind`` and a help text wait for nothing; ``__init__.pyi``
-lists them, for people, editors and type checkers alike.
+Names are imported when first used, so that ``import ascentwind`` and a help text wait for nothing. ``__init__.pyi``
+lists them for editors and type checkers; it is not read here, because parsing it would double the time of the import.
 """
-
-from importlib.metadata import version as _version
 
 import lazy_loader as _lazy
 
-__version__ = _version("ascentwind")
-__getattr__, __dir__, __all__ = _lazy.attach_stub(__name__, __file__)
+__getattr__, __dir__, __all__ = _lazy.attach(
+    __name__,
+    submodules={"errors"},
+    submod_attrs={
+        "model.system.define": ["define_system"],
+        "model.system.linear_system": ["LinearSystem"],
+        "model.vehicle.reader": ["load_vehicle"],
+        "runners.construct.build_vehicle": ["build_vehicle"],
+        "runners.design.design": ["design"],
+        "runners.parameter_study.run": ["run_parameter_study"],
+        "runners.statistics.results": ["ResponseStatistics"],
+        "runners.study": ["Study"],
+        "runners.wind.synthesis.synthesise": ["synthesise"],
+        "version": ["__version__"],
+    },
+)

@@ -8,5 +8,4 @@ from .runners.parameter_study.run import run_parameter_study as run_parameter_st
 from .runners.statistics.results import ResponseStatistics as ResponseStatistics
 from .runners.study import Study as Study
 from .runners.wind.synthesis.synthesise import synthesise as synthesise
-
-__version__: str
+from .version import __version__ as __version__

@@ -6,10 +6,24 @@ import difflib
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 
 class AscentwindError(Exception):
-    """Base of every error that ascentwind raises on purpose."""
+    """Base of every error that ascentwind raises on purpose.
+
+    Its message and attributes travel between processes, whatever its class asks for when it is made.
+    """
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _made_again, (type(self), self.args, self.__dict__)
+
+
+def _made_again(kind: type[AscentwindError], args: tuple[Any, ...], attributes: dict[str, Any]) -> AscentwindError:
+    """Return an error as it was, without another call of its constructor, whose arguments are not those kept."""
+    error = kind.__new__(kind, *args)
+    error.__dict__.update(attributes)
+    return error
 
 
 class DataError(AscentwindError):

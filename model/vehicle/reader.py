@@ -43,10 +43,9 @@ from .coverage import check_schedule, check_wind, loaded_flight
 from .names import name_faults
 from .noise_loads import check_noises, form_of_tables, needed_columns
 from .plausibility import check_plausibility
+from .shipped import VEHICLE_FILE
 from .vehicle import TableSource, Vehicle
 from .vehicle_file import TableEntry, VehicleFile, WindEntry, WindRecordEntry, read_vehicle_file
-
-VEHICLE_FILE = "vehicle.toml"
 
 
 def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehicle:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..errors import UnknownNameError
-from .reader import VEHICLE_FILE
 
+VEHICLE_FILE = "vehicle.toml"
 _FOLDER = Path(__file__).parents[1] / "vehicles"
 
 

@@ -9,25 +9,24 @@ import typer
 from rich.table import Table
 
 from ..present.terminal import console
-from .terminal import VehicleArgument
+from .job import Job, load_study
+from .terminal import Changes, VehicleArgument
 
 
 def mean(
     vehicle: VehicleArgument,
     out: Annotated[Path | None, typer.Option(help="Folder for the figure; none without it.")] = None,
+    changes: Changes = None,
 ) -> None:
     """The mean response in the mean wind by the nonlinear planar equations, beside the linear one."""
     import numpy as np
 
-    from ..present.files import prepare_folder
     from ..present.style import words, write_figure
-    from ..study import Study
     from ..views.mean_comparison import mean_comparison, mean_comparison_figure
 
+    study = load_study(vehicle, changes)
+    job = Job(out) if out else None
     with console.status("flying through the mean wind"):
-        study = Study.load(vehicle)
-        if out:
-            prepare_folder(out)
         found = mean_comparison(study)
     table = Table("response", "linear, peak deg", "at s", "nonlinearity, deg", "at s", "bending and slosh, deg", "at s")
     degrees = found["mean"] * (180 / np.pi)
@@ -44,7 +43,7 @@ def mean(
             cells += [f"{float(values[i]):.4f}", f"{float(found['time'][i]):.1f}"]
         table.add_row(*cells)
     console.print(table)
-    if out:
+    if job:
         title = f"{study.system.name}: mean response in the mean wind"
-        for path in write_figure(mean_comparison_figure(found, title), out, "mean_response"):
-            console.print(str(path), soft_wrap=True)
+        job.written += write_figure(mean_comparison_figure(found, title), job.folder, "mean_response")
+        job.end()

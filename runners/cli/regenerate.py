@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -45,14 +46,14 @@ def generated_files(system: LinearSystem) -> dict[str, str]:
     return {**sources, "manifest.json": json.dumps(manifest, indent=1) + "\n"}
 
 
-def regenerate(vehicle: str | Path, folder: Path) -> dict[Path, str]:
+def regenerate(vehicle: str | Path, folder: Path, changes: Mapping[str, Any] | None = None) -> dict[Path, str]:
     """Write the generated files of a vehicle and say of each whether and why it changed.
 
     Raises
     ------
     OutputFolderError
     """
-    system = Study.load(vehicle, compile=False).system
+    system = Study.load(vehicle, compile=False, changes=changes).system
     target = folder / system.name
     prepare_folder(target)
     before = _structure(target / "manifest.json")

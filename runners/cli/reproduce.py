@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ..present.terminal import console, progress_bar
+from .job import Job, load_study, steps
 
 STEPS = 45  # about as many as there are options, winds and evaluations of a calibration
 
@@ -29,18 +29,14 @@ def reproduce(
     from ..reproduction.page import Reproduction, page
     from ..reproduction.predictions import predict
     from ..reproduction.winds import compare, wind_figure
-    from ..study import Study
 
+    job = Job(out)
     prepare_folder(out / "figures")
     vehicle = "as504"
-    study = Study.load(vehicle)
+    study = load_study(vehicle)
     construction = load_construction(find_vehicle(vehicle))
-    with progress_bar() as bar:
-        task = bar.add_task("options", total=STEPS)
-
-        def step(text: str) -> None:
-            bar.update(task, advance=1, description=text)
-
+    with steps("options", STEPS) as bar:
+        step = bar.done
         found = effects(vehicle, lambda name: step(f"option {name}"))
         local = next(e.responses for e in found if e.option and e.option.name == "local_angle_of_attack")
         assert local is not None
@@ -53,6 +49,6 @@ def reproduce(
         step("mean wind")
     text = page(Reproduction(predictions, found, winds, checks, calibration, scaled))
     title = "Bending moment of AS-504 at station 25 m under different winds"
-    written = write_figure(wind_figure(winds, title), out / "figures", "reproduction_winds")
-    write_whole(out / "reproduction.md", lambda p: p.write_text(text, encoding="utf-8"))
-    console.print(f"{out / 'reproduction.md'} and {len(written)} figures written", soft_wrap=True)
+    job.written += write_figure(wind_figure(winds, title), out / "figures", "reproduction_winds")
+    job.written.append(write_whole(out / "reproduction.md", lambda p: p.write_text(text, encoding="utf-8")))
+    job.end()

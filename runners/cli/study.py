@@ -7,8 +7,9 @@ from typing import Annotated
 
 import typer
 
-from ..present.terminal import console, errors, progress_bar
+from ..present.terminal import console, errors
 from .exit_codes import INTERRUPTED
+from .job import load_study, print_files, steps
 
 
 def study(
@@ -25,24 +26,21 @@ def study(
     from ..parameter_study.plan import read_plan
     from ..parameter_study.report import report
     from ..parameter_study.run import run_parameter_study
-    from ..study import Study
 
     plan = read_plan(file)
     folder = out or Path(f"{file.stem}-results")
     assert plan.vehicle is not None  # read_plan asks it of a file
-    with console.status("loading and preparing code"):
-        loaded = Study.load(plan.vehicle)
+    loaded = load_study(plan.vehicle)
     started = False
     try:
-        with progress_bar() as progress:
-            task = progress.add_task("members", total=None)
+        with steps("members") as bar:
 
             def advance(count: int, total: int) -> None:
                 nonlocal started
                 if not started and count:
-                    progress.console.print(f"{count} of {total} members were stored in {folder} before", style="dim")
+                    console.print(f"{count} of {total} members were stored in {folder} before", style="dim")
                 started = True
-                progress.update(task, completed=count, total=total)
+                bar.reached(count, total)
 
             result = run_parameter_study(file, folder, study=loaded, scheduler=scheduler, progress=advance)
         with console.status("first-order prediction and figures"):
@@ -50,4 +48,4 @@ def study(
     except KeyboardInterrupt:
         errors.print(f"stopped; members done are stored in {folder}: run the same command again to go on from there")
         raise typer.Exit(INTERRUPTED) from None
-    console.print(f"{len(written)} files in {folder}: {', '.join(p.name for p in written)}", soft_wrap=True)
+    print_files(written, folder)

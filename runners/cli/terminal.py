@@ -37,7 +37,24 @@ def results_folder(vehicle: str, ending: str) -> Path:
     return Path(f"{Path(vehicle).resolve().name or 'vehicle'}-{ending}")
 
 
-VehicleArgument = Annotated[str, typer.Argument(help="A shipped vehicle ('ascentwind vehicles') or a vehicle folder.")]
+def _shipped(incomplete: str) -> list[str]:
+    """Return the shipped vehicles that a shell may complete; where there is none, it offers folders."""
+    from ...model.vehicle.shipped import built_in_vehicles
+
+    return [name for name in built_in_vehicles() if name.startswith(incomplete)]
+
+
+VehicleArgument = Annotated[
+    str,
+    typer.Argument(
+        help="A shipped vehicle ('ascentwind vehicles') or a vehicle folder.",
+        autocompletion=_shipped,
+    ),
+]
+Changes = Annotated[
+    list[str] | None,
+    typer.Option("--set", help="KEY=VALUE in the place of vehicle.toml's, e.g. options.full_coupling=true."),
+]
 
 
 def parse_changes(texts: Sequence[str]) -> dict[str, Any]:

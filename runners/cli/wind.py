@@ -11,12 +11,13 @@ from rich.table import Table
 
 from ...model.errors import DataError, OutputFolderError
 from ..present.terminal import console
-from .terminal import VehicleArgument, given, refuse_unused
+from .job import Job, load_study, steps
+from .terminal import Changes, VehicleArgument, given, refuse_unused
 
 if TYPE_CHECKING:
     from ...model.wind.shaping_filter import ShapingFilter
 
-app = typer.Typer(no_args_is_help=True, help="Wind statistics, and filters that turn white noise into that wind.")
+wind = typer.Typer(no_args_is_help=True, help="Wind statistics, and filters that turn white noise into that wind.")
 
 Period = Annotated[str, typer.Option(help="Month in English, or annual.")]
 Component = Annotated[str, typer.Option(help="zonal or meridional.")]
@@ -82,7 +83,7 @@ def _statistics_of(
     return _statistics(context, period, component, edition, top, soundings)
 
 
-@app.command()
+@wind.command()
 def apply(
     context: typer.Context,
     vehicle: Annotated[str, typer.Argument(help="Vehicle folder; its vehicle.toml is changed.")],
@@ -133,7 +134,7 @@ def apply(
             console.print(line, soft_wrap=True, highlight=False, markup=False)
 
 
-@app.command()
+@wind.command()
 def stats(
     context: typer.Context,
     period: Period = "march",
@@ -159,7 +160,7 @@ def stats(
     console.print(table)
 
 
-@app.command()
+@wind.command()
 def fit(
     context: typer.Context,
     period: Period = "march",
@@ -211,7 +212,7 @@ def fit(
     )
 
 
-@app.command()
+@wind.command()
 def check(
     context: typer.Context,
     filter_file: Annotated[Path, typer.Argument(help="Filter written by 'ascentwind wind fit'.")],
@@ -239,7 +240,7 @@ def check(
     console.print(table)
 
 
-@app.command()
+@wind.command()
 def plot(
     context: typer.Context,
     filter_file: Annotated[Path, typer.Argument(help="Filter written by 'ascentwind wind fit'.")],
@@ -257,13 +258,12 @@ def plot(
     from ...model.vehicle.reader import load_vehicle
     from ...model.vehicle.shipped import find_vehicle
     from ...model.wind.filter_file import read_filter
-    from ..present.files import prepare_folder
     from ..present.style import write_figure
     from ..wind.figures import coefficient_figure, covariance_figure, deviation_figure, interval_figure
     from ..wind.fitting.analytic_fits import fit_deviation
     from ..wind.verification import verify
 
-    prepare_folder(out)
+    job = Job(out)
     shaping_filter = read_filter(filter_file)
     s = _statistics_of(context, shaping_filter, period, component, edition, top, soundings)
     loaded = load_vehicle(find_vehicle(vehicle))
@@ -277,26 +277,25 @@ def plot(
         "interval_9km": interval_figure(s, covariance),
         "standard_deviation": deviation_figure(s, fit_deviation(s.altitude[1:], s.standard_deviation[1:])),
     }
-    written = [p for name, figure in figures.items() for p in write_figure(figure, out, name)]
-    console.print(f"{len(written)} files in {out}: {', '.join(p.name for p in written)}", soft_wrap=True)
+    for name, figure in figures.items():
+        job.written += write_figure(figure, out, name)
+    job.end()
 
 
-@app.command()
+@wind.command()
 def compare(
     vehicle: VehicleArgument,
     time: Annotated[float | None, typer.Option(help="End time, s; greatest dynamic pressure without it.")] = None,
     response: Annotated[str, typer.Option(help="Response.")] = "bending_moment",
+    changes: Changes = None,
 ) -> None:
     """A response under different winds: months, editions, the closed form, and filters as poor as the report's."""
     from dataclasses import replace
-
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
     from ...model.wind.range_reference import shipped_statistics
     from ..case.times import time_of_greatest_dynamic_pressure
     from ..present.style import display, words
     from ..solvers.least_squares import FitOptions
-    from ..study import Study
     from ..views.wind_comparison import (
         CASES,
         REPORT_ERRORS,
@@ -308,7 +307,7 @@ def compare(
     )
     from ..wind.fitting.progress import fit_progress
 
-    study = Study.load(vehicle)
+    study = load_study(vehicle, changes)
     assert study.vehicle is not None
     record = recorded_wind(study.vehicle)
     component = record.origin.component
@@ -320,10 +319,8 @@ def compare(
         for rms in REPORT_ERRORS:
             poorer = stretched_to_error(fitted.shaping_filter, march, rms)
             winds[f"march, wrong by {rms:.0f} m²/s² rms"] = replace(fitted, shaping_filter=poorer)
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=console, transient=True) as bar:
-        task = bar.add_task("responses", total=len(winds) + 1)
-        found = compare_winds(study, winds, time, response, progress=lambda: bar.advance(task))
+    with steps("responses", len(winds) + 1) as bar:
+        found = compare_winds(study, winds, time, response, progress=bar.done)
     factor, unit = display(found[0].unit, [c.deviation for c in found])
     table = Table(
         title=f"{words(response).capitalize()} at {time:g} s, {component} wind alone",

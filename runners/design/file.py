@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from pydantic import Field
 
@@ -83,8 +84,14 @@ def find_design(where: str) -> Path:
     return file
 
 
-def load_design(file: Path) -> DesignTask:
+def load_design(file: Path, changes: Mapping[str, Any] | None = None) -> DesignTask:
     """Read a design file and load its vehicle.
+
+    Parameters
+    ----------
+    file : Path
+    changes : mapping, optional
+        Values in the place of those in vehicle.toml, by dotted key.
 
     Raises
     ------
@@ -94,7 +101,7 @@ def load_design(file: Path) -> DesignTask:
     """
     entry = read_toml(file, DesignEntry)
     vehicle = file.parent if entry.vehicle is None else file.parent / entry.vehicle
-    study = Study.load(vehicle if vehicle.is_dir() else str(entry.vehicle))
+    study = Study.load(vehicle if vehicle.is_dir() else str(entry.vehicle), changes=changes)
     problem = _problem(study, entry, entry.parameters)
     variants = {}
     if entry.trade is not None:

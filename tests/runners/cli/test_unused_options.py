@@ -42,6 +42,22 @@ UNUSED = [
     (["run", "as504", "--engine", "covariance", "--method", "bdf"], "engine 'covariance' takes no method"),
     (["run", "as504", "--engine", "ensemble", "--tolerance", "1e-6"], "engine 'ensemble' takes no relative tolerance"),
     (["run", "as504", "--times", "70", "--set", 'default_times="80"'], "--set default_times is not used with --times"),
+    *(
+        ([*command, "--set", 'default_times="80"'], "--set default_times is not used here")
+        for command in (
+            ["verify", "as504", "--times", "70"],
+            ["tolerance", "as504"],
+            ["sensitivity", "as504", "--time", "75"],
+            ["equations"],
+            ["inspect", "as504", "--time", "70"],
+            ["mean", "as504"],
+            ["design", "design.toml"],
+            ["regenerate", "as504"],
+            ["wind", "compare", "as504"],
+        )
+    ),
+    (["sensitivity", "as504", "--set", "weighting_times_s=[70]"], "--set weighting_times_s is not used here"),
+    (["regenerate", "--set", "options.slosh_reaction=true"], "--set needs a vehicle"),
     (["run", "as504", "--set", 'wind.correlation.source="x"'], 'used with wind.synthesis = "closed_form"'),
     (
         ["run", "as504", "--set", 'wind.synthesis="closed_form"', "--set", 'wind.filter="x.json"'],
@@ -56,17 +72,17 @@ KNOWN = {
     "run": {"times", "out", "engine", "method", "tolerance", "changes", "along_vehicle"},
     "vehicles": set(),
     "new-vehicle": {"source"},
-    "inspect": {"time", "json"},
-    "regenerate": {"out"},
+    "inspect": {"time", "json", "changes"},
+    "regenerate": {"out", "changes"},
     "doctor": set(),
     "cache": {"clean"},
-    "verify": {"times", "runs", "seed", "out"},
-    "tolerance": {"times", "out"},
-    "sensitivity": {"response", "time", "source", "quantity", "out"},
-    "equations": {"of", "by", "page"},
+    "verify": {"times", "runs", "seed", "out", "changes"},
+    "tolerance": {"times", "out", "changes"},
+    "sensitivity": {"response", "time", "source", "quantity", "out", "changes"},
+    "equations": {"of", "by", "page", "changes"},
     "study": {"out", "scheduler"},
-    "mean": {"out"},
-    "design": {"out", "trades"},
+    "mean": {"out", "changes"},
+    "design": {"out", "trades", "changes"},
     "reproduce": {"out"},
     "build-vehicle": {"out", "figures", "spacing"},
     "wind apply": {"component", "azimuth", "sign", "period", "edition", "soundings", "site"},
@@ -76,7 +92,7 @@ KNOWN = {
     },
     "wind check": {"period", "component", "edition", "top", "soundings", "profiles"},
     "wind plot": {"period", "component", "edition", "top", "soundings", "vehicle", "out"},
-    "wind compare": {"time", "response"},
+    "wind compare": {"time", "response", "changes"},
 }  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""``ascentwind build-vehicle``: from what a vehicle is built of to its tables."""
+"""The commands about vehicle folders: ``vehicles``, ``new-vehicle`` and ``build-vehicle``."""
 
 from __future__ import annotations
 
@@ -10,7 +10,31 @@ from rich.table import Table
 
 from ...model.errors import OutputFolderError
 from ...model.vehicle.shipped import built_in_vehicles
-from ..present.terminal import console, progress_bar
+from ..present.terminal import console
+from .job import Job, print_files, steps
+
+
+def vehicles() -> None:
+    """The vehicles that ship with ascentwind."""
+    from ...model.vehicle.reader import load_vehicle
+    from ...model.vehicle.shipped import built_in_vehicles
+
+    table = Table("name", "what", "times (s)", "folder")
+    for name, folder in built_in_vehicles().items():
+        vehicle = load_vehicle(folder)
+        table.add_row(name, vehicle.title, f"{vehicle.start:g} - {vehicle.end:g}", str(folder))
+    console.print(table)
+
+
+def new_vehicle(
+    folder: Annotated[Path, typer.Argument(help="Folder to make.")],
+    source: Annotated[str, typer.Option("--from", help="Vehicle to start from.")] = "as504",
+) -> None:
+    """A vehicle folder of your own to edit: one TOML file and CSV tables."""
+    from .new_vehicle import copy_vehicle
+
+    copied = copy_vehicle(source, folder)
+    console.print(f"{len(copied)} files in {folder}; edit vehicle.toml, then 'ascentwind run {folder}'", soft_wrap=True)
 
 
 def build_vehicle(
@@ -27,7 +51,6 @@ def build_vehicle(
     from ..construct.build_vehicle import build_vehicle as build
     from ..construct.figures import FIGURES
     from ..construct.vehicle_numbers import STEPS
-    from ..present.files import prepare_folder
     from ..present.style import write_figure
 
     shipped = built_in_vehicles()
@@ -37,27 +60,18 @@ def build_vehicle(
             f"({shipped[vehicle]}) to replace its tables"
         )
     folder = Path(vehicle) if Path(vehicle).is_dir() or vehicle not in shipped else shipped[vehicle]
-    with progress_bar() as progress:
-        task = progress.add_task(STEPS[0], total=len(STEPS) + len(FIGURES) + 1)
-
-        def done(step: str) -> None:
-            after = STEPS.index(step) + 1
-            progress.update(task, advance=1, description=STEPS[after] if after < len(STEPS) else "tables")
-
-        numbers, written = build(folder, out, spacing=spacing, progress=done)
-        progress.update(task, advance=1, description="figures")
-        pictures = figures or (out or folder) / "figures"
-        prepare_folder(pictures)
+    with steps(STEPS[0], len(STEPS) + len(FIGURES) + 1) as bar:
+        following = dict(zip(STEPS, (*STEPS[1:], "tables"), strict=True))
+        numbers, written = build(folder, out, spacing=spacing, progress=lambda step: bar.done(following[step]))
+        bar.done("figures")
+        job = Job(figures or (out or folder) / "figures")
         for name, draw in FIGURES.items():
-            written += write_figure(draw(numbers), pictures, name)
-            progress.advance(task)
+            job.written += write_figure(draw(numbers), job.folder, name)
+            bar.done()
     flight = numbers.flight
     table = Table("event", "time (s)", title=f"Mean flight of {numbers.construction.name}")
     for event, time in sorted(flight.events.items(), key=lambda item: item[1]):
         table.add_row(event.replace("_", " "), f"{time:.2f}")
     console.print(table)
-    console.print(
-        f"{len(written)} files: {', '.join(p.name for p in written if p.suffix != '.svg')} in {out or folder}, "
-        f"figures in {pictures}",
-        soft_wrap=True,
-    )
+    print_files(written, out or folder)
+    job.end()

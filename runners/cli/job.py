@@ -1,0 +1,131 @@
+"""The frame of a command that computes: its study, its folder, its progress, its last line."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rich.progress import Progress
+
+from ...model.errors import UnusedOptionError
+from ..present.terminal import console, progress_bar
+from .terminal import parse_changes
+
+if TYPE_CHECKING:
+    from ..present.manifest import Manifest
+    from ..study import Study
+
+SHOWN = ("default_times", "title", "weighting_times_s")  # keys of vehicle.toml that no equation holds
+
+
+def load_study(vehicle: str | Path, changes: Sequence[str] | None = None, shows: Sequence[str] = ()) -> Study:
+    """Load a vehicle with the changes typed after ``--set``.
+
+    Parameters
+    ----------
+    vehicle : str or Path
+    changes : sequence of str, optional
+        Each 'KEY=VALUE'.
+    shows : sequence of str
+        Which of ``SHOWN`` the command reads: another one would change nothing.
+
+    Raises
+    ------
+    DataError, UnknownNameError, UnusedOptionError
+    """
+    wanted = checked_changes(changes, shows)
+    with console.status("loading and preparing code"):
+        from ..study import Study
+
+        return Study.load(vehicle, changes=wanted)
+
+
+def checked_changes(changes: Sequence[str] | None, shows: Sequence[str] = ()) -> dict[str, Any]:
+    """Return the changes typed after ``--set``, as :func:`load_study` takes them.
+
+    Raises
+    ------
+    DataError, UnusedOptionError
+    """
+    wanted = parse_changes(changes or [])
+    for key in SHOWN:
+        if key in wanted and key not in shows:
+            raise UnusedOptionError(f"--set {key} is not used here and would change nothing; leave it out")
+    return wanted
+
+
+class Steps:
+    """A bar on the terminal, of which one step after another is done."""
+
+    def __init__(self, bar: Progress, text: str, total: int | None):
+        self.bar, self.task = bar, bar.add_task(text, total=total)
+
+    def done(self, text: str | None = None) -> None:
+        """Advance by one step; ``text`` says what is being done now."""
+        if text is not None:
+            self.bar.update(self.task, description=text)
+        self.bar.advance(self.task)
+
+    def reached(self, count: int, total: int) -> None:
+        """Advance to a number of steps, of a total that may not have been known before."""
+        self.bar.update(self.task, completed=count, total=total)
+
+
+@contextmanager
+def steps(text: str, total: int | None = None) -> Iterator[Steps]:
+    """Show a bar while something is computed step by step."""
+    with progress_bar() as bar:
+        yield Steps(bar, text, total)
+
+
+class Job:
+    """What a command writes: a folder that is there before anything is computed, its files, and a last line.
+
+    Parameters
+    ----------
+    folder : Path
+
+    Raises
+    ------
+    OutputFolderError
+        If nothing can be written there.
+    """
+
+    def __init__(self, folder: Path):
+        from ..present.files import prepare_folder
+
+        prepare_folder(folder)
+        self.folder = folder
+        self.written: list[Path] = []
+        self.manifest: Manifest | None = None
+
+    def replace_earlier(self, command: str, of: str) -> None:
+        """Say in the folder's manifest that what an earlier run of a command wrote is about to be replaced.
+
+        Raises
+        ------
+        OutputFolderError
+        """
+        from ..present.manifest import Manifest
+
+        self.manifest = Manifest.begin(self.folder, command, of)
+
+    def end(self) -> None:
+        """Print what was written and where, and what became of an earlier run's files.
+
+        Raises
+        ------
+        OutputFolderError
+        """
+        print_files(self.written, self.folder)
+        for sentence in self.manifest.finish(self.written) if self.manifest else ():
+            console.print(sentence, style="dim", soft_wrap=True, markup=False)
+
+
+def print_files(written: Iterable[Path], folder: Path) -> None:
+    """Print the last line of a command: the files it wrote, by their place in a folder."""
+    names = [path.relative_to(folder).as_posix() for path in written]
+    count = "1 file" if len(names) == 1 else f"{len(names)} files"
+    console.print(f"{count} in {folder}: {', '.join(names)}", soft_wrap=True)

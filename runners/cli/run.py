@@ -1,0 +1,141 @@
+"""The command ``run``: the main job, tables and figures of all responses."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.table import Table
+
+from ...model.errors import AscentwindError, UnusedOptionError
+from ..present.terminal import console, errors
+from .job import SHOWN, Job, load_study, steps
+from .terminal import Changes, VehicleArgument, parse_changes, results_folder
+
+if TYPE_CHECKING:
+    from ..statistics.peak_check import PeakCheck
+    from ..statistics.results import ResponseStatistics
+    from ..study import Study
+
+
+def run(
+    vehicle: VehicleArgument,
+    times: Annotated[str | None, typer.Option(help="End times in s: START:STOP:STEP or T1,T2,...")] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for results; VEHICLE-results without it.")] = None,
+    engine: Annotated[
+        str | None, typer.Option(help="sweep, cvodes, covariance or ensemble; the sweep where a compiler is found.")
+    ] = None,
+    method: Annotated[str | None, typer.Option(help="CVODES formulas, adams or bdf; chooses cvodes.")] = None,
+    tolerance: Annotated[float | None, typer.Option(help="Relative tolerance of the integration.")] = None,
+    changes: Changes = None,
+    along_vehicle: Annotated[
+        str | None,
+        typer.Option(help="Bending moment along the vehicle at this time (s, or 'peak'), and its envelope."),
+    ] = None,
+) -> None:
+    """Mean, variance and |mean| + 3 sigma of all responses over flight time: tables and figures.
+
+    Every peak is computed again by CVODES, one adjoint run back from it; exit code 1 when they disagree.
+    """
+    from ..case.times import parse_times
+    from ..present.style import words, write_figure
+    from ..statistics.engines import engine_options
+    from ..statistics.figures import response_figure, weighting_figure
+    from ..statistics.files import write_statistics
+    from ..statistics.larger_side import LABEL
+    from ..statistics.peak_check import weighting_at, with_peak_check
+    from ..views.along_vehicle_files import prepare_along_vehicle, write_along_vehicle
+
+    settings = {"method": method, "relative_tolerance": tolerance}
+    engine_options(engine, **settings)  # refused before anything is computed
+    if times and "default_times" in parse_changes(changes or []):
+        raise UnusedOptionError("--set default_times is not used with --times; leave one of them out")
+    study = load_study(vehicle, changes, SHOWN)
+    assert study.vehicle is not None
+    engine, options = engine_options(engine, compiled=study.executable.shared_library is not None, **settings)
+    end_times = parse_times(times or study.vehicle.file.default_times)
+    moment_time = None if along_vehicle is None else prepare_along_vehicle(study, along_vehicle)
+    families = [t for t in study.vehicle.file.weighting_times_s if study.system.start < t <= study.system.end]
+    study.checked_times(end_times)
+    job = Job(out or results_folder(vehicle, "results"))
+    with steps("end times", len(end_times)) as bar:
+        statistics = study.response_statistics(
+            end_times, engine=engine, options=options, progress=lambda t: bar.done(f"end time {t:g} s")
+        )
+    job.replace_earlier("run", study.system.name)
+    job.written += write_statistics(statistics, job.folder)
+    with console.status("peaks again by another road"):
+        check = _check_peaks(study, statistics)
+    if check is not None:
+        statistics = with_peak_check(statistics, check, study)
+        write_statistics(statistics, job.folder)
+        families = sorted({*families, *(p.time for p in check.peaks[:1] if p.time > study.system.start)})
+    with steps("figures", len(study.system.outputs) + len(families) + 1) as bar:
+        for output in study.system.outputs:
+            title = f"{study.vehicle.title}\n{words(output.name).capitalize()}, mean and {LABEL}"
+            figure = response_figure(statistics, output.name, title)
+            job.written += write_figure(figure, job.folder, output.name)
+            bar.done()
+        weighting = []
+        for t in families:
+            weighting.append(study.weighting_function(t) if check is None else weighting_at(study, check, t))
+            bar.done()
+        if weighting:
+            first = study.system.outputs[0]
+            title = f"{study.vehicle.title}\nWeighting function from wind to {words(first.name)}"
+            figure = weighting_figure(weighting, first.name, first.unit, title)
+            job.written += write_figure(figure, job.folder, "weighting_functions")
+        bar.done()
+    if along_vehicle is not None:
+        with console.status("bending moment along the vehicle"):
+            job.written += write_along_vehicle(study, end_times, moment_time, job.folder)
+    _print_peaks(statistics)
+    top = study.vehicle.wind.mean.argument[-1]
+    if study.tables(end_times[-1])["altitude"] > top:
+        console.print(f"Above {top / 1000:g} km the wind tables end and their last values are held.", style="dim")
+    job.end()
+    agree = check is not None and check.agree
+    if check is not None:
+        console.print(
+            check.verdict(), style="green" if agree else "bold red", markup=False, highlight=False, soft_wrap=True
+        )
+    if not agree:
+        raise typer.Exit(1)
+
+
+def _check_peaks(study: Study, statistics: ResponseStatistics) -> PeakCheck | None:
+    """Hold the peaks of written results against another road; where it fails say so, so that nothing is lost."""
+    from ..statistics.peak_check import check_peaks
+
+    try:
+        return check_peaks(study, statistics)
+    except AscentwindError as error:
+        text = f"The peaks could not be computed a second time, by another road, and stand unchecked: {error}"
+        errors.print(text, style="bold red", markup=False, highlight=False, soft_wrap=True)
+        return None
+
+
+def _print_peaks(statistics) -> None:
+    from ..present.style import display, words
+    from ..statistics.larger_side import LABEL
+    from ..statistics.peaks import peaks
+
+    found = peaks(statistics)
+    table = Table("response", title=f"Peaks of {LABEL}")
+    for column in ("time", LABEL, "side", "mean", "σ"):
+        table.add_column(column, justify="right", no_wrap=True)
+    for peak in found:
+        factor, unit = display(peak.unit, peak.value)
+        value, mean, std = (f"{factor * x:.4g} {unit}" for x in (peak.value, peak.mean, peak.std))
+        table.add_row(words(peak.response), f"{peak.time:g} s{'*' if peak.at_end else ''}", value, peak.side, mean, std)
+    console.print(table)
+    table = Table("response", title="Share of the variance at the peak")
+    for source in found[0].shares:
+        table.add_column(words(source), justify="right")
+    for peak in found:
+        table.add_row(words(peak.response), *(f"{100 * share:.2f} %" for share in peak.shares.values()))
+    console.print(table)
+    at_end = any(peak.at_end for peak in found)
+    if at_end:
+        console.print("* on the first or last end time asked for; the peak of the flight may lie beyond", style="dim")
