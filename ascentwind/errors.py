@@ -6,11 +6,10 @@ __getattr__, __dir__, __all__ = _lazy.attach(
     "ascentwind",
     submod_attrs={
         "codegen.ensemble.compiled": ["EnsembleNeedsCompilerError"],
-        "codegen.system.executable": ["InterpreterWarning"],
         "codegen.toolchain.c_printer": ["UnsupportedOperationError"],
         "codegen.toolchain.cache": ["CacheError", "CacheWarning"],
         "codegen.toolchain.compiler": ["CompilerError"],
-        "codegen.toolchain.library": ["NoCompilerError"],
+        "codegen.toolchain.library": ["InterpreterWarning", "NoCompilerError"],
         "model.errors": [
             "AscentwindError",
             "AscentwindWarning",

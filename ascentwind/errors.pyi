@@ -1,9 +1,9 @@
 from .codegen.ensemble.compiled import EnsembleNeedsCompilerError as EnsembleNeedsCompilerError
-from .codegen.system.executable import InterpreterWarning as InterpreterWarning
 from .codegen.toolchain.c_printer import UnsupportedOperationError as UnsupportedOperationError
 from .codegen.toolchain.cache import CacheError as CacheError
 from .codegen.toolchain.cache import CacheWarning as CacheWarning
 from .codegen.toolchain.compiler import CompilerError as CompilerError
+from .codegen.toolchain.library import InterpreterWarning as InterpreterWarning
 from .codegen.toolchain.library import NoCompilerError as NoCompilerError
 from .model.errors import AscentwindError as AscentwindError
 from .model.errors import AscentwindWarning as AscentwindWarning

@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 import xarray as xr
 
+from ..codegen.sweep.compiled import sweep_of
 from ..model.errors import ParameterValueError
 from ..model.system.linear_system import COMBINED
 from .case.case import Case
@@ -21,7 +22,7 @@ from .solvers.adjoint import AdjointSolver
 from .solvers.integration import IntegratorOptions
 from .solvers.mean_response import with_mean_tables
 from .solvers.stability import warn_if_unstable
-from .solvers.sweep import SweepOptions, batch, sweep, sweep_of
+from .solvers.sweep import SweepOptions, batch, sweep
 from .statistics.engines import Progress, batch_dataset, compute_statistics
 from .statistics.results import ResponseStatistics
 from .statistics.weighting import weighting_dataset, weighting_family

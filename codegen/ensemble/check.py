@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from .compiled import CompiledEnsemble
+from .simulation import CompiledEnsemble, Steps
 
 AGREEMENT = 1e-10
 SEED, RUN = 504, 3
@@ -16,8 +13,6 @@ SEED, RUN = 504, 3
 
 def difference_from_numpy(engine: CompiledEnsemble, states: int, sources: int, outputs: int) -> float:
     """Return the largest difference between outputs of a run and those of NumPy, relative to the largest."""
-    from .compiled import Steps
-
     random = np.random.default_rng(SEED)
     shapes = [(sources, states, states), (2, states, states), (2, sources, states, states), (2, outputs, states)]
     steps = Steps(*(random.standard_normal(shape) for shape in shapes))

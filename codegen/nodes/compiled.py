@@ -14,19 +14,16 @@ the count of parameters.
 
 from __future__ import annotations
 
-import ctypes
 import logging
 from dataclasses import dataclass, replace
-from functools import lru_cache
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...model.system.linear_system import LinearSystem
-from ..toolchain.cache import CacheError, compiled_library, set_aside
-from ..toolchain.compiler import find_compiler, optimizing
+from ..system.executable import ExecutableSystem
 from ..toolchain.fingerprint import fingerprint
+from ..toolchain.library import Library, Recipe
 from .expressions import MATRICES, NodeExpressions, node_expressions
 from .matrix import NodeMatrix
 from .source import SOURCE_FILES, nodes_source
@@ -34,7 +31,6 @@ from .source import SOURCE_FILES, nodes_source
 log = logging.getLogger(__name__)
 
 AGREEMENT = 1e-12  # between compiled and interpreted functions, of the largest entry
-_POINTER = ctypes.POINTER(ctypes.c_double)
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +38,7 @@ class NodeFunctions:
     """The functions of a system at many points, compiled where a compiler is found, else interpreted."""
 
     expressions: NodeExpressions
-    shared_library: Path | None
+    shared_library: Library | None
 
     def numbers(self, p: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the numbers z of parameters p."""
@@ -109,17 +105,25 @@ class NodeFunctions:
             result = function.map(count)(*columns).full()
             return result[:summed] @ weights, result[summed:].T
         total, kept = np.zeros(summed), np.empty((count, function.numel_out(0) - summed))
-        call = getattr(ctypes.CDLL(str(self.shared_library)), function.name())
-        call.restype = None
-        pointers = [x.ctypes.data_as(_POINTER) for x in arrays]
         strides = [1, *(0 if x.ndim == 1 else x.shape[1] for x in arrays[1:])]
-        given = [part for pair in zip(pointers, map(ctypes.c_long, strides), strict=True) for part in pair]
-        call(ctypes.c_long(count), *given, *(x.ctypes.data_as(_POINTER) for x in (weights, total, kept)))
+        given = [part for pair in zip(arrays, map(np.long, strides), strict=True) for part in pair]
+        self.shared_library.call_to_the_end(function.name(), np.long(count), *given, weights, total, kept)
         return total, kept
 
 
-@lru_cache(maxsize=4)
-def node_functions(system: LinearSystem, compile: bool = True) -> NodeFunctions:
+def node_functions_of(executable: ExecutableSystem) -> NodeFunctions:
+    """Return the functions of a system, made once for all its numbers, compiled where the system itself is.
+
+    Raises
+    ------
+    CompilerError
+        If a compiler was found and failed.
+    """
+    compiled = executable.shared_library is not None
+    return executable.libraries.held("nodes", lambda: node_functions(executable.system, compiled))
+
+
+def node_functions(system: LinearSystem, may_compile: bool = True) -> NodeFunctions:
     """Derive the functions of a system and, where a compiler is found, generate and compile their C.
 
     Raises
@@ -128,27 +132,22 @@ def node_functions(system: LinearSystem, compile: bool = True) -> NodeFunctions:
         If a compiler was found and failed.
     """
     expressions = node_expressions(system)
-    compiler = find_compiler() if compile else None
+    return NodeFunctions(expressions, node_recipe(system, expressions).load(may_compile))
+
+
+def node_recipe(system: LinearSystem, expressions: NodeExpressions) -> Recipe:
+    """Return how the library of the functions is made."""
     interpreted = NodeFunctions(expressions, None)
-    if compiler is None:
-        return interpreted
-    try:
-        library = compiled_library(
-            f"{system.name}-nodes",
-            fingerprint(system, expressions.at_points, SOURCE_FILES),
-            lambda: nodes_source(system, expressions.at_points),
-            optimizing(compiler),
-            dict(system.structure),
-        )
-    except CacheError as error:
-        log.info("the sensitivities of %s are interpreted: %s", system.name, error)
-        return interpreted
-    compiled = replace(interpreted, shared_library=library.path)
-    if not _difference(compiled, interpreted) <= AGREEMENT:
-        set_aside(library)
-        log.warning("%s differs from the interpreter and was set aside: the interpreter is used", library.path)
-        return interpreted
-    return compiled
+    return Recipe(
+        system,
+        "nodes",
+        fingerprint=lambda: fingerprint(system, expressions.at_points, SOURCE_FILES),
+        source=lambda: nodes_source(system, expressions.at_points),
+        difference=lambda library: _difference(replace(interpreted, shared_library=library), interpreted),
+        agreement=AGREEMENT,
+        optimised=True,
+        say=lambda level, why: log.log(level, "sensitivities of %s: %s", system.name, why),
+    )
 
 
 def _difference(one: NodeFunctions, other: NodeFunctions) -> float:

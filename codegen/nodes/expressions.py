@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import casadi as ca
 
@@ -44,7 +43,6 @@ class NodeExpressions:
         return self.matrices, self.quadratic, self.linear
 
 
-@lru_cache(maxsize=8)
 def node_expressions(system: LinearSystem) -> NodeExpressions:
     """Derive the functions of a system."""
     n, r = len(system.states), len(system.outputs)

@@ -2,45 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
 from ...model.errors import AscentwindError
-from ...model.system.linear_system import LinearSystem
-from ...model.tables import TableGroup, run_time_vector, table_values
+from ...model.tables import table_values
 from ..system.functions import declared_sizes, state_scales
+from ..system.nominal import NominalNumbers
+from .integrator import CompiledSweep
 from .runge_kutta import DOP853
-
-if TYPE_CHECKING:
-    from .compiled import CompiledSweep
+from .segments import Segments
 
 AGREEMENT = 1e-7  # of scaled numbers; a wrong library is off in the first digits
 STEP_TIMES_ROOT, LONGEST, SHORTEST = 0.1, 1e-2, 1e-6  # s, of what is integrated; the interpreter takes one step
 POINTS = 3  # one that agrees is enough: an undeclared jump may lie within another
 TOLERANCE = 1e-8
-
-
-@dataclass(frozen=True, eq=False)
-class NominalNumbers:
-    """A system's own numbers, as its sweep takes them."""
-
-    system: LinearSystem
-
-    @property
-    def groups(self) -> tuple[TableGroup, ...]:
-        return self.system.tables
-
-    @cached_property
-    def tables(self) -> NDArray[np.float64]:
-        return run_time_vector(self.groups) if self.groups else np.zeros(1)
-
-    @cached_property
-    def parameters(self) -> NDArray[np.float64]:
-        return np.array([p.value for p in self.system.parameters], float)
 
 
 def difference_from_interpreter(sweep: CompiledSweep, seed: int = 504) -> float:
@@ -60,8 +36,6 @@ def difference_from_interpreter(sweep: CompiledSweep, seed: int = 504) -> float:
 
 
 def _difference_at(sweep: CompiledSweep, numbers: NominalNumbers, time: float) -> float:
-    from .compiled import Segments
-
     system, scale = sweep.system, state_scales(sweep.system)
     A = _matrices(sweep, numbers, time)[0]
     if not np.isfinite(A).all():

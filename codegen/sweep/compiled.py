@@ -1,255 +1,48 @@
-"""The compiled sweep of a system: C written for it, compiled, cached, and called without Python's lock."""
+"""The compiled sweep of a system: C written for it, compiled, cached, and held against CasADi."""
 
 from __future__ import annotations
 
-import ctypes
-from dataclasses import dataclass
-from functools import cached_property
-
-import numpy as np
-from numpy.typing import NDArray
-
-from ...model.errors import DataError, IntegrationError, StepBudgetError
 from ...model.system.linear_system import LinearSystem
 from ..system.executable import ExecutableSystem
-from ..system.functions import declared_sizes
-from ..toolchain.cache import CompiledLibrary, compiled_library, wrong_numbers
-from ..toolchain.compiler import find_compiler, optimizing
-from ..toolchain.interruption import call
-from ..toolchain.library import NoCompilerError, pointer
-from .check import AGREEMENT, NominalNumbers, difference_from_interpreter
-from .source import MOST_STEPS, SweepFunctions, sweep_fingerprint, sweep_functions, sweep_source
-
-NOT_FINITE, TOO_SMALL_A_STEP, OUT_OF_RANGE, TOO_MANY_STEPS = 1, 2, 3, 4  # as in the template
-COUNTERS = ("steps", "rejected", "evaluations")
+from ..toolchain.library import Recipe
+from .check import AGREEMENT, difference_from_interpreter
+from .integrator import CompiledSweep
+from .source import SweepFunctions, sweep_fingerprint, sweep_functions, sweep_source
 
 
-@dataclass(frozen=True, eq=False)
-class Segments:
-    """Consecutive pieces of flight.
+def sweep_of(executable: ExecutableSystem) -> CompiledSweep:
+    """Return the compiled sweep of a system, made once for all its numbers.
 
-    Attributes
-    ----------
-    start : float
-        s.
-    end, low, high : (k,) arrays
-        Ends, increasing, and the limits of table lookup in each piece, s.
+    Raises
+    ------
+    NoCompilerError
+        Without a compiler, or for a system that is not to be compiled.
+    CompilerError, CacheError
     """
-
-    start: float
-    end: NDArray[np.float64]
-    low: NDArray[np.float64]
-    high: NDArray[np.float64]
+    system = executable.system
+    return executable.libraries.held("sweep", lambda: compiled_sweep(system, executable.may_compile))
 
 
-@dataclass(frozen=True, eq=False)
-class SegmentResults:
-    """What the compiled sweep returns at the end of every segment.
-
-    Attributes
-    ----------
-    covariance : (k, sources, responses, responses) array
-    mean : (k, responses) array
-    error : (k, sources, responses) array
-        Estimated relative error of the standard deviation.
-    transition : (k, n, n) array or None
-        Transition matrix of each segment.
-    counters : dict
-    """
-
-    covariance: NDArray[np.float64]
-    mean: NDArray[np.float64]
-    error: NDArray[np.float64]
-    transition: NDArray[np.float64] | None
-    counters: dict[str, int]
-
-
-@dataclass(frozen=True, eq=False)
-class CompiledSweep:
-    """The sweep integrator of one system; calls from several threads do not disturb each other."""
-
-    system: LinearSystem
-    functions: SweepFunctions
-    shared_library: CompiledLibrary
-
-    @cached_property
-    def _handle(self) -> ctypes.CDLL:
-        return ctypes.CDLL(str(self.shared_library.path))
-
-    def run(
-        self,
-        executable: ExecutableSystem,
-        segments: Segments,
-        tolerance: float,
-        sizes: NDArray[np.float64] | None = None,
-        transition: bool = False,
-    ) -> SegmentResults:
-        """Sweep over the segments.
-
-        Parameters
-        ----------
-        executable : ExecutableSystem
-            Parameters and tables.
-        segments : Segments
-        tolerance : float
-            Of one step, relative to the size of the states.
-        sizes : (n + responses,) array
-            Typical sizes of states and responses; those that the system declares without it.
-        transition : bool
-            Keep the transition matrices.
-
-        Raises
-        ------
-        IntegrationError, DataError
-        """
-        system, n = self.system, len(self.system.states)
-        covariances = [system.start_covariance_matrix(name, executable.parameters) for name in system.sources]
-        state = np.ascontiguousarray(np.array(covariances).reshape(len(system.sources), n, n))
-        return self.integrate(executable, segments, tolerance, state, sizes, transition)
-
-    def integrate(
-        self,
-        executable: ExecutableSystem | NominalNumbers,
-        segments: Segments,
-        tolerance: float,
-        state: NDArray[np.float64],
-        sizes: NDArray[np.float64] | None = None,
-        transition: bool = False,
-    ) -> SegmentResults:
-        """Sweep from covariances (sources, n, n) of the states, which become those at the end; else as ``run``."""
-        system = self.system
-        k, n, s, r = segments.end.size, len(system.states), len(system.sources), len(system.outputs)
-        covariance, mean, error = np.empty((k, s, r, r)), np.empty((k, r)), np.empty((k, s, r))
-        kept = np.empty((k, n, n)) if transition else None
-        counters, failure = np.zeros(3), np.zeros(2)
-        code = call(
-            self._handle.sweep,
-            *self._arguments(executable, segments, tolerance, sizes),
-            *map(pointer, (state, np.zeros(n), covariance, mean, error, kept, counters, failure)),
-        )
-        self._check(code, failure, executable, tolerance)
-        return SegmentResults(covariance, mean, error, kept, _named(counters))
-
-    def mean_history(
-        self,
-        executable: ExecutableSystem | NominalNumbers,
-        segments: Segments,
-        tolerance: float,
-        sizes: NDArray[np.float64] | None = None,
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], dict[str, int]]:
-        """Return states (k + 1, n) and outputs (k + 1, responses) of the mean at the start and all segment ends.
-
-        The third is the counters.
-
-        Raises
-        ------
-        IntegrationError, DataError
-        """
-        points = segments.end.size + 1
-        states, outputs = np.empty((points, len(self.system.states))), np.empty((points, len(self.system.outputs)))
-        counters, failure = np.zeros(3), np.zeros(2)
-        code = call(
-            self._handle.mean_history,
-            *self._arguments(executable, segments, tolerance, sizes),
-            *map(pointer, (states, outputs, counters, failure)),
-        )
-        self._check(code, failure, executable, tolerance)
-        return states, outputs, _named(counters)
-
-    def _arguments(
-        self,
-        executable: ExecutableSystem | NominalNumbers,
-        segments: Segments,
-        tolerance: float,
-        sizes: NDArray[np.float64] | None = None,
-    ) -> list[object]:
-        arrays = (segments.end, segments.low, segments.high, executable.parameters, executable.tables)
-        return [
-            ctypes.c_int(segments.end.size),
-            ctypes.c_double(segments.start),
-            *map(pointer, arrays),
-            ctypes.c_double(tolerance),
-            pointer(declared_sizes(self.system) if sizes is None else np.ascontiguousarray(sizes, float)),
-        ]
-
-    def _check(
-        self,
-        code: int,
-        failure: NDArray[np.float64],
-        executable: ExecutableSystem | NominalNumbers,
-        tolerance: float,
-    ) -> None:
-        time, entry = float(failure[0]), int(failure[1])
-        if code == NOT_FINITE:
-            for group in executable.groups:
-                bad = ~np.isfinite(group.coefficients).all(axis=1)
-                if bad.any():
-                    interval, table = np.argwhere(bad)[0]
-                    raise DataError(
-                        f"table '{group.names[table]}' holds a value that is not finite near {group.argument} "
-                        f"{group.knots[interval]:g}; correct the table",
-                        time=time,
-                    )
-            for parameter, value in zip(self.system.parameters, executable.parameters, strict=True):
-                if not np.isfinite(value):
-                    raise DataError(f"parameter '{parameter.name}' is {value:g}; give it a finite value", time=time)
-            raise IntegrationError(
-                f"{self._entry(entry)} is not finite at t = {time:g} s; see what divides by zero there"
-            )
-        if code == TOO_SMALL_A_STEP:
-            raise IntegrationError(
-                f"a tolerance of {tolerance:g} a step cannot be met at t = {time:g} s; loosen it, or look for a jump "
-                "that no event declares"
-            )
-        if code == TOO_MANY_STEPS:
-            raise StepBudgetError(MOST_STEPS, f"t = {time:.6g} s", time=time)
-        if code == OUT_OF_RANGE:
-            raise IntegrationError(
-                f"the responses leave the range of numbers near t = {time:g} s; the system grows without bound there "
-                "(see its roots)"
-            )
-
-    def _entry(self, entry: int) -> str:
-        """Name a nonzero of A, B or E u by its number in the generated code."""
-        names, stage = self.system.state_names, self.functions.stage
-        A, B, known = (stage.sparsity_out(i) for i in range(3))
-        if entry < A.nnz():
-            return f"A: the effect of '{names[A.get_col()[entry]]}' on the rate of '{names[A.row()[entry]]}'"
-        entry -= max(A.nnz(), 1)
-        if entry < B.nnz():
-            noise = self.system.noise_names[B.get_col()[entry]]
-            return f"B: the effect of noise '{noise}' on the rate of '{names[B.row()[entry]]}'"
-        row = known.row()[entry - max(B.nnz(), 1)]
-        return f"the effect of the known inputs on the rate of '{names[row]}'"
-
-
-def compiled_sweep(system: LinearSystem) -> CompiledSweep:
+def compiled_sweep(system: LinearSystem, may_compile: bool = True) -> CompiledSweep:
     """Generate and compile the sweep of a system, or take it from the cache; hold its numbers against CasADi's.
 
     Raises
     ------
     NoCompilerError, CompilerError, CacheError
     """
-    compiler = find_compiler()
-    if compiler is None:
-        raise NoCompilerError(
-            "the sweep is compiled for each system, and no C compiler was found (CC, cc, gcc, clang); install one, or "
-            "use engine='cvodes', which works without"
-        )
     functions = sweep_functions(system)
-    library = compiled_library(
-        f"{system.name}-sweep",
-        sweep_fingerprint(system, functions),
-        lambda: sweep_source(system, functions),
-        optimizing(compiler),
-        dict(system.structure),
+    return CompiledSweep(system, functions, sweep_recipe(system, functions).require(may_compile))
+
+
+def sweep_recipe(system: LinearSystem, functions: SweepFunctions) -> Recipe:
+    """Return how the library of the sweep is made."""
+    return Recipe(
+        system,
+        "sweep",
+        fingerprint=lambda: sweep_fingerprint(system, functions),
+        source=lambda: sweep_source(system, functions),
+        difference=lambda library: difference_from_interpreter(CompiledSweep(system, functions, library)),
+        agreement=AGREEMENT,
+        optimised=True,
+        way_out="use engine='cvodes', which works without",
     )
-    compiled = CompiledSweep(system, functions, library)
-    difference = difference_from_interpreter(compiled)
-    if not difference <= AGREEMENT:
-        raise wrong_numbers(library, difference)
-    return compiled
-
-
-def _named(counters: NDArray[np.float64]) -> dict[str, int]:
-    return {name: int(value) for name, value in zip(COUNTERS, counters, strict=True)}

@@ -2,32 +2,21 @@
 
 from __future__ import annotations
 
-import logging
-import warnings
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ...model.errors import AscentwindWarning
 from ...model.system.linear_system import LinearSystem
 from ...model.system.time_conditions import Stops
 from ...model.tables import TableGroup, run_time_vector, table_values
-from ..toolchain.cache import CacheError, CompiledLibrary, compiled_library, set_aside
-from ..toolchain.compiler import find_compiler
+from ..toolchain.library import Libraries, Library, Recipe
 from .functions import MATRICES, CoreFunctions, SystemFunctions, core_functions, interpreted_functions
 from .source import c_source, source_fingerprint
 
-log = logging.getLogger(__name__)
-
 AGREEMENT = 1e-12  # between compiled and interpreted functions, of the largest entry
-_said_once: set[str] = set()
-
-
-class InterpreterWarning(AscentwindWarning):
-    """Compiled code is not used; results are the same, slower."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +27,7 @@ class ExecutableSystem:
     ----------
     system : LinearSystem
     core : CoreFunctions
-    shared_library : CompiledLibrary or None
+    shared_library : Library or None
         None when the interpreter is used.
     groups : tuple of TableGroup
         The tables in force; their shapes are the system's.
@@ -46,14 +35,17 @@ class ExecutableSystem:
         Values in the order of ``system.parameters``.
     may_compile : bool
         Whether engines that exist as compiled code only may be compiled for it.
+    libraries : Libraries
+        Those of its engines, made when first asked for and shared by the system with all its numbers.
     """
 
     system: LinearSystem
     core: CoreFunctions
-    shared_library: CompiledLibrary | None
+    shared_library: Library | None
     groups: tuple[TableGroup, ...]
     parameters: NDArray[np.float64]
     may_compile: bool = True
+    libraries: Libraries = field(default_factory=Libraries)
 
     @cached_property
     def tables(self) -> NDArray[np.float64]:
@@ -118,32 +110,22 @@ def executable_system(system: LinearSystem, compile: bool = True) -> ExecutableS
     CompilerError
         If a compiler was found and failed.
     """
-    core = core_functions(system)
     nominal = np.array([p.value for p in system.parameters])
-    interpreted = ExecutableSystem(system, core, None, system.tables, nominal, may_compile=compile)
-    compiler = find_compiler() if compile else None
-    if compiler is None:
-        if compile:
-            _say_once("no C compiler was found (CC, cc, gcc, clang): CasADi's interpreter is used, a few times slower")
-        return interpreted
-    try:
-        fingerprint = source_fingerprint(system, core)
-        library = compiled_library(
-            system.name, fingerprint, lambda: c_source(system, core), compiler, dict(system.structure)
-        )
-    except CacheError as error:
-        _say_once(f"compiled code is not used: {error}")
-        return interpreted
-    compiled = replace(interpreted, shared_library=library)
-    difference = difference_from_core(compiled)
-    if not difference <= AGREEMENT:
-        set_aside(library)
-        _say_once(
-            f"the compiled library {library.path} differs from the interpreter by {difference:.1e} and was set "
-            "aside: the interpreter is used"
-        )
-        return interpreted
-    return compiled
+    interpreted = ExecutableSystem(system, core_functions(system), None, system.tables, nominal, may_compile=compile)
+    return replace(interpreted, shared_library=system_recipe(interpreted).load(compile))
+
+
+def system_recipe(interpreted: ExecutableSystem) -> Recipe:
+    """Return how the library of a system's own functions is made."""
+    system, core = interpreted.system, interpreted.core
+    return Recipe(
+        system,
+        "",
+        fingerprint=lambda: source_fingerprint(system, core),
+        source=lambda: c_source(system, core),
+        difference=lambda library: difference_from_core(replace(interpreted, shared_library=library)),
+        agreement=AGREEMENT,
+    )
 
 
 def difference_from_core(executable: ExecutableSystem, points: int = 2, seed: int = 504) -> float:
@@ -182,9 +164,3 @@ def difference_from_core(executable: ExecutableSystem, points: int = 2, seed: in
                 difference = float(np.abs(a[differ] - b[differ]).max()) / scale
                 largest = difference if not difference <= largest else largest
     return largest
-
-
-def _say_once(text: str) -> None:
-    if text not in _said_once:
-        _said_once.add(text)
-        warnings.warn(InterpreterWarning(text), stacklevel=3)

@@ -147,15 +147,6 @@ def set_aside(library: CompiledLibrary) -> None:
         library.path.replace(library.path.with_suffix(f".wrong-{os.getpid()}"))
 
 
-def wrong_numbers(library: CompiledLibrary, difference: float) -> CacheError:
-    """Set a library aside that nothing else can stand in for, and return the error to raise."""
-    set_aside(library)
-    return CacheError(
-        f"the compiled library {library.path} differs from the interpreter by {difference:.1e} and was set aside; run "
-        "the same again, which compiles it anew, or take engine='cvodes'"
-    )
-
-
 def _install(path: Path, source: str, compiler: Compiler) -> None:
     with tempfile.TemporaryDirectory(prefix=f"{path.stem}.", suffix=WORK, dir=path.parent) as work:
         c_file, library = Path(work) / "system.c", Path(work) / "system.so"

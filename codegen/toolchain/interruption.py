@@ -6,11 +6,13 @@ compiled code itself: it waits for threads that do, and when it is interrupted i
 
 from __future__ import annotations
 
-import ctypes
 import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from types import TracebackType
+
+import numpy as np
+from numpy.typing import NDArray
 
 STOPPED = -1  # what compiled code returns that found the flag raised; the templates say the same
 
@@ -25,27 +27,25 @@ class Workers(ThreadPoolExecutor):
     """
 
     def __init__(self, threads: int):
-        self._flag = ctypes.c_int(0)
+        self._flag = _lowered()
         super().__init__(threads, initializer=setattr, initargs=(_of_thread, "flag", self._flag))
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         if kind is not None:
-            self._flag.value = 1
+            self._flag[0] = 1
             self.shutdown(cancel_futures=True)
         super().__exit__(kind, error, trace)
 
 
-def call(function: Callable[..., int], *arguments: object) -> int:
+def interruptible(function: Callable[[NDArray[np.intc]], int]) -> int:
     """Call compiled code so that Ctrl-C ends it, and return what it returns.
 
     Parameters
     ----------
     function : callable
-        Returns an int, and takes the address of the flag after all other arguments.
-    arguments : objects
-        As ctypes takes them.
+        Returns an int, and takes the flag, an array of one.
 
     Raises
     ------
@@ -56,9 +56,13 @@ def call(function: Callable[..., int], *arguments: object) -> int:
     if flag is None:
         if threading.current_thread() is threading.main_thread():
             with Workers(1) as pool:
-                return pool.submit(call, function, *arguments).result()
-        flag = ctypes.c_int(0)  # of a thread that is not ours: nobody raises it
-    code = function(*arguments, ctypes.byref(flag))
+                return pool.submit(interruptible, function).result()
+        flag = _lowered()  # of a thread that is not ours: nobody raises it
+    code = function(flag)
     if code == STOPPED:
         raise KeyboardInterrupt
     return code
+
+
+def _lowered() -> NDArray[np.intc]:
+    return np.zeros(1, np.intc)

@@ -8,9 +8,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ...codegen.sweep.source import sweep_functions, sweep_source
-from ...codegen.system.functions import core_functions
-from ...codegen.system.source import c_source
+from ...codegen.ensemble.compiled import ensemble_recipe
+from ...codegen.nodes.compiled import node_recipe
+from ...codegen.nodes.expressions import node_expressions
+from ...codegen.sweep.compiled import sweep_recipe
+from ...codegen.sweep.source import sweep_functions
+from ...codegen.system.executable import executable_system, system_recipe
 from ...codegen.toolchain.cache import describe_changes
 from ...model.system.linear_system import LinearSystem
 from ..present.files import prepare_folder, write_whole
@@ -18,11 +21,18 @@ from ..study import Study
 
 
 def generated_files(system: LinearSystem) -> dict[str, str]:
-    """Return the texts of NAME.c (adjoint, mean, matrices), NAME_sweep.c and manifest.json for a system."""
-    sources = {
-        f"{system.name}.c": c_source(system, core_functions(system)),
-        f"{system.name}_sweep.c": sweep_source(system, sweep_functions(system)),
-    }
+    """Return the texts of manifest.json and of all generated C of a system.
+
+    NAME.c holds adjoint, mean and matrices, NAME_sweep.c all end times in one pass, NAME_nodes.c gradients and
+    collocation, NAME_ensemble.c simulated flights.
+    """
+    recipes = (
+        system_recipe(executable_system(system, compile=False)),
+        sweep_recipe(system, sweep_functions(system)),
+        node_recipe(system, node_expressions(system)),
+        ensemble_recipe(system),
+    )
+    sources = {recipe.file_name: recipe.source() for recipe in recipes}
     manifest: dict[str, Any] = {
         "name": system.name,
         "sha256": {name: hashlib.sha256(text.encode()).hexdigest() for name, text in sources.items()},

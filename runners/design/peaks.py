@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ...codegen.nodes.compiled import node_functions
+from ...codegen.nodes.compiled import node_functions_of
 from ...model.errors import IntegrationError, UnstableSystemWarning
 from ...model.system.linear_system import COMBINED
 from ..sensitivity.gradient import gradient_of
@@ -48,7 +48,7 @@ def gradients(study: Study, rows: Iterable[Row], parameters: tuple[str, ...]) ->
     """Return the derivatives of 3 sigma + sign * mean with respect to parameters by adjoint pairs, (n,) each."""
     rows, system = list(rows), study.system
     columns = [system.parameter_names.index(name) for name in parameters]
-    functions = node_functions(system, study.executable.shared_library is not None)
+    functions = node_functions_of(study.executable)
     flight = FlightNodes.until(study.with_means, functions, sorted({time for _, _, time in rows}), keep=len(rows) > 1)
     pairs = {
         (response, time): AdjointPair(flight, system.output_index(response), time, system.sources)

@@ -17,10 +17,10 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from ...codegen.sweep.compiled import sweep_of
 from ...model.errors import AscentwindError
 from ...model.vehicle.vehicle import Vehicle
 from ..case.provenance import data_hash
-from ..solvers.sweep import sweep_of
 from ..study import Study
 from .compute import Chunk, ChunkResult, Task, compute_chunk, empty_result
 

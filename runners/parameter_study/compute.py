@@ -9,9 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...codegen.sweep.compiled import sweep_of
 from ...model.errors import AscentwindError
 from ..solvers.stability import first_unstable
-from ..solvers.sweep import sweep, sweep_of, with_sweep_mean_tables
+from ..solvers.sweep import sweep, with_sweep_mean_tables
 from ..study import Study
 from .quantities import Quantity, member_numbers
 

@@ -17,10 +17,10 @@ import xarray as xr
 from filelock import FileLock, Timeout
 from numpy.typing import NDArray
 
+from ...codegen.sweep.compiled import sweep_of
 from ...model.errors import AscentwindError, OutputFolderError
 from ..case.provenance import provenance
 from ..present.files import prepare_folder, write_bytes
-from ..solvers.sweep import sweep_of
 from ..study import Study
 from .compute import Chunk, ChunkResult, Task
 from .plan import ParameterStudyPlan

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ...codegen.nodes.compiled import node_functions
+from ...codegen.nodes.compiled import node_functions_of
 from ...codegen.toolchain.interruption import Workers
 from ..case.provenance import provenance
 from ..case.times import end_times
@@ -42,7 +42,7 @@ def sensitivities(
     requests = [Request.of(case, name, source, quantity) for name in names]
     rows = parameter_rows(case.system, parameters)
     warn_if_unstable(case.executable, ends[-1])
-    functions = node_functions(case.system, case.executable.shared_library is not None)
+    functions = node_functions_of(case.executable)
     flight = FlightNodes.until(case.with_means, functions, ends, keep=len(ends) * len(requests) > 1)
     _ = flight.mean  # once, before the threads
 

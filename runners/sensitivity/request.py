@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...codegen.nodes.compiled import node_functions
+from ...codegen.nodes.compiled import node_functions_of
 from ...model.errors import AscentwindError, UnknownNameError
 from ...model.system.linear_system import COMBINED, LinearSystem
 from ..case.case import Case
@@ -93,7 +93,7 @@ class Request:
         return Request(response, source, quantity, system.output_index(response), sources)
 
     def pair(self, case: Case, time: float) -> AdjointPair:
-        functions = node_functions(case.system, case.executable.shared_library is not None)
+        functions = node_functions_of(case.executable)
         flight = FlightNodes.until(case.with_means, functions, [time])
         return AdjointPair(flight, self.row, time, self.sources)
 

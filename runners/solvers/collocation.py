@@ -7,11 +7,8 @@ discretised variance (Sanz-Serna 2016, SIAM Review 58, 3-33).
 
 from __future__ import annotations
 
-import ctypes
 import logging
 from functools import cached_property
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +16,7 @@ from scipy.linalg import get_lapack_funcs
 
 from ...codegen.nodes.elimination import elimination_plan
 from ...codegen.nodes.matrix import NodeMatrix
-from ...codegen.toolchain.interruption import call
+from ...codegen.toolchain.library import Library
 from ...model.errors import IntegrationError
 from .collocation_grid import NODES, STAGES, WEIGHTS, Grid
 
@@ -109,23 +106,22 @@ class CompiledCollocation:
     ----------
     grid, A :
         As above.
-    library : Path
+    library : Library
     keep : bool
         Keep the factors of all steps (27 KB a step of AS-504), which pays for more than a few solutions. Without it
         every solution makes them again, step by step in the processor's cache.
     """
 
-    def __init__(self, grid: Grid, A: NodeMatrix, library: Path, keep: bool = False):
+    def __init__(self, grid: Grid, A: NodeMatrix, library: Library, keep: bool = False):
         self.grid, self._A, self._keep = grid, A, keep
-        code, plan = ctypes.CDLL(str(library)), elimination_plan(A.pattern)
-        self._forward, self._backward = code.collocation_forward, code.collocation_backward
+        self._library, plan = library, elimination_plan(A.pattern)
         tableau = np.concatenate([TABLEAU.T.ravel(), WEIGHTS, FROM_STAGES])
         factors = np.empty((grid.steps.size if keep else 1, plan[1], STAGES**2))
         self._arrays = (plan, grid.steps, np.ascontiguousarray(A.values), tableau, factors)
         self._regular = True
         if keep:
-            steps = ctypes.c_long(grid.steps.size)
-            self._regular = bool(call(code.collocation_factorise, steps, *map(_pointer, self._arrays)))
+            steps = np.long(grid.steps.size)
+            self._regular = bool(library.call("collocation_factorise", steps, *self._arrays))
 
     @cached_property
     def _exchanging(self) -> Collocation:
@@ -133,12 +129,12 @@ class CompiledCollocation:
         return Collocation(self.grid, self._A)
 
     def forward(self, start: NDArray, forcing: NDArray) -> tuple[NDArray, NDArray]:
-        return self._solve(self._forward, start, forcing) or self._exchanging.forward(start, forcing)
+        return self._solve("collocation_forward", start, forcing) or self._exchanging.forward(start, forcing)
 
     def backward(self, end: NDArray, forcing: NDArray) -> tuple[NDArray, NDArray]:
-        return self._solve(self._backward, end, forcing) or self._exchanging.backward(end, forcing)
+        return self._solve("collocation_backward", end, forcing) or self._exchanging.backward(end, forcing)
 
-    def _solve(self, code: Any, first: NDArray, forcing: NDArray) -> tuple[NDArray, NDArray] | None:
+    def _solve(self, function: str, first: NDArray, forcing: NDArray) -> tuple[NDArray, NDArray] | None:
         if not self._regular:
             return None
         state, stages = np.array(first, float), np.empty(forcing.shape)
@@ -147,16 +143,13 @@ class CompiledCollocation:
         if not self._keep:
             factors = np.empty_like(factors)  # several threads may solve at once
         arrays = (np.ascontiguousarray(forcing), state, stages, edges, np.empty(STAGES * state.size))
-        pointers = (*map(_pointer, (*given, factors)), ctypes.c_int(self._keep), *map(_pointer, arrays))
-        return (stages, edges) if call(code, ctypes.c_long(forcing.shape[0]), *pointers) else None
-
-
-def _pointer(array: NDArray) -> ctypes.c_void_p:
-    return array.ctypes.data_as(ctypes.c_void_p)
+        steps = np.long(forcing.shape[0])
+        regular = self._library.call(function, steps, *given, factors, int(self._keep), *arrays)
+        return (stages, edges) if regular else None
 
 
 def collocation(
-    grid: Grid, A: NodeMatrix, library: Path | None, keep: bool = False
+    grid: Grid, A: NodeMatrix, library: Library | None, keep: bool = False
 ) -> Collocation | CompiledCollocation:
     """Return the solver of a grid, compiled where there is a library."""
     return Collocation(grid, A) if library is None else CompiledCollocation(grid, A, library, keep)

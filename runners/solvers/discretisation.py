@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import matrix_balance
 
-from ...codegen.ensemble.compiled import Steps
+from ...codegen.ensemble.simulation import Steps
 from ...codegen.system.evaluation import MatrixEvaluator
 from ...codegen.system.executable import ExecutableSystem
 from ...codegen.system.functions import state_scales

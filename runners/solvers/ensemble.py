@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2, t
 
-from ...codegen.ensemble.compiled import EnsembleNeedsCompilerError, compiled_ensemble
+from ...codegen.ensemble.compiled import ensemble_of
 from ...codegen.system.executable import ExecutableSystem
 from ...codegen.toolchain.interruption import Workers
 from ...model.errors import AscentwindError
@@ -133,17 +133,12 @@ def run_ensemble(executable: ExecutableSystem, times: list[float], options: Ense
     EnsembleNeedsCompilerError, CompilerError, IntegrationError
     """
     system = executable.system
-    if not executable.may_compile:
-        raise EnsembleNeedsCompilerError(
-            f"'{system.name}' was loaded with compile=False, and the ensemble exists as compiled code only; load it "
-            "without compile=False, or take another engine"
-        )
+    engine = ensemble_of(executable)
     grid = np.asarray(times, float)
     if options.paths:
         count = max(1, int(np.ceil((times[-1] - system.start) / options.path_spacing - 1e-9)))
         grid = np.union1d(grid, np.linspace(system.start, times[-1], count + 1)[:-1])
     found = discretise(executable, grid.tolist(), options.substep)
-    engine = compiled_ensemble(system)
     firsts = range(0, options.runs, CHUNK)
 
     def chunk(first: int) -> tuple[NDArray, NDArray | None]:

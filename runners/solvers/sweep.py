@@ -11,11 +11,13 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...codegen.sweep.compiled import CompiledSweep, Segments, compiled_sweep
-from ...codegen.system.executable import ExecutableSystem, InterpreterWarning
+from ...codegen.sweep.compiled import sweep_of
+from ...codegen.sweep.integrator import CompiledSweep
+from ...codegen.sweep.segments import Segments
+from ...codegen.system.executable import ExecutableSystem
 from ...codegen.toolchain.cache import CacheError
 from ...codegen.toolchain.interruption import Workers
-from ...codegen.toolchain.library import NoCompilerError
+from ...codegen.toolchain.library import InterpreterWarning
 from ...model.errors import AscentwindError, IntegrationError, TimeRangeError
 from ...model.system.linear_system import LinearSystem
 from .cores import available_cores
@@ -49,26 +51,6 @@ class SweepOptions:
                 f"a relative tolerance of {self.relative_tolerance:g} cannot be met; choose {LEAST_TOLERANCE:g} to "
                 f"{LARGEST_TOLERANCE:g}"
             )
-
-
-def sweep_of(executable: ExecutableSystem) -> CompiledSweep:
-    """Return the compiled sweep of a system, the same one for every study of it.
-
-    Raises
-    ------
-    NoCompilerError
-        Without a compiler, or for a system that is not to be compiled.
-    CompilerError, CacheError
-    """
-    if not executable.may_compile:
-        raise NoCompilerError(
-            f"'{executable.system.name}' was loaded with compile=False, and the sweep exists as compiled code only; "
-            "use engine='cvodes', or load it without compile=False"
-        )
-    return _sweep_of(executable.system)
-
-
-_sweep_of = lru_cache(maxsize=16)(compiled_sweep)
 
 
 def available_sweep(executable: ExecutableSystem) -> CompiledSweep | None:

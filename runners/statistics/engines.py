@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...codegen.sweep.compiled import sweep_of
 from ...model.errors import AscentwindWarning, IntegrationError, UnknownNameError
 from ...model.system.linear_system import COMBINED
 from ..case.provenance import provenance
@@ -16,7 +17,7 @@ from ..solvers.adjoint import AdjointSolver
 from ..solvers.covariance import CovarianceOptions, covariance_equation
 from ..solvers.ensemble import EnsembleOptions
 from ..solvers.integration import IntegratorOptions
-from ..solvers.sweep import LEAST_TOLERANCE, SweepOptions, SweepResult, available_sweep, sweep, sweep_of
+from ..solvers.sweep import LEAST_TOLERANCE, SweepOptions, SweepResult, available_sweep, sweep
 from ..solvers.time_nodes import time_nodes
 from .ensemble import ensemble_dataset
 from .results import ResponseStatistics, response_dataset, statistics_dataset

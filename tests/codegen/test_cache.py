@@ -17,17 +17,17 @@ from typer.testing import CliRunner
 
 from ascentwind.codegen.ensemble.compiled import compiled_ensemble
 from ascentwind.codegen.sweep.compiled import compiled_sweep
-from ascentwind.codegen.system import executable as compiled_module
-from ascentwind.codegen.system.executable import InterpreterWarning, executable_system
+from ascentwind.codegen.system.executable import executable_system
 from ascentwind.codegen.toolchain import cache as cache_module
+from ascentwind.codegen.toolchain import library as library_module
 from ascentwind.codegen.toolchain.cache import CacheError, cache_contents, cache_folder, clean_cache, remove_leftovers
 from ascentwind.codegen.toolchain.compiler import CompilerError, find_compiler, run_program
+from ascentwind.codegen.toolchain.library import InterpreterWarning
 from ascentwind.model import define_system
 from ascentwind.runners import Study
 from ascentwind.runners.cli.app import app
 from ascentwind.runners.cli.doctor import diagnose
 from ascentwind.runners.present.files import prepare_folder
-from ascentwind.runners.solvers import sweep as sweep_engine
 
 VARIANCE = 0.5 * (1 - np.exp(-2.0))  # of x' = -x + n at 1 s
 
@@ -47,8 +47,7 @@ def variance(study: Study, **options) -> float:
 def own_cache(tmp_path, monkeypatch):
     folder = tmp_path / "cache"
     monkeypatch.setenv("ASCENTWIND_CACHE", str(folder))
-    monkeypatch.setattr(compiled_module, "_said_once", set())
-    sweep_engine._sweep_of.cache_clear()
+    monkeypatch.setattr(library_module, "_said_once", set())
     return folder
 
 
@@ -97,7 +96,6 @@ def test_disk_that_fills_up_before_the_sweep_leaves_cvodes(own_cache, monkeypatc
 def test_read_only_cache_that_holds_all_is_used(own_cache, monkeypatch):
     assert variance(Study.from_system(lag())) == pytest.approx(VARIANCE, rel=1e-6)
     before = sorted((p.name, p.stat().st_mtime_ns) for p in own_cache.iterdir())
-    sweep_engine._sweep_of.cache_clear()
 
     def refuse(*_, **__):
         raise PermissionError(errno.EROFS, os.strerror(errno.EROFS))

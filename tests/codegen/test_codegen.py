@@ -14,12 +14,14 @@ import numpy as np
 import pytest
 
 from ascentwind.codegen.system import executable as compiled_module
-from ascentwind.codegen.system.executable import InterpreterWarning, difference_from_core, executable_system
+from ascentwind.codegen.system.executable import difference_from_core, executable_system
 from ascentwind.codegen.system.functions import core_functions
 from ascentwind.codegen.system.source import c_source
+from ascentwind.codegen.toolchain import library as library_module
 from ascentwind.codegen.toolchain.c_printer import UnsupportedOperationError, c_function
 from ascentwind.codegen.toolchain.cache import CacheError, CacheWarning, CompiledLibrary, cache_folder, describe_changes
 from ascentwind.codegen.toolchain.compiler import CompilerError, find_compiler
+from ascentwind.codegen.toolchain.library import InterpreterWarning
 from ascentwind.model import LinearSystem, define_system
 from ascentwind.runners import Study
 
@@ -41,7 +43,7 @@ def loaded(system: LinearSystem) -> CompiledLibrary:
 def own_cache(tmp_path, monkeypatch):
     folder = tmp_path / "cache"
     monkeypatch.setenv("ASCENTWIND_CACHE", str(folder))
-    monkeypatch.setattr(compiled_module, "_said_once", set())
+    monkeypatch.setattr(library_module, "_said_once", set())
     return folder
 
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ascentwind.codegen.toolchain.interruption import Workers, call
+from ascentwind.codegen.toolchain.interruption import Workers, interruptible
 from ascentwind.model.vehicle.shipped import built_in_vehicles
 from ascentwind.runners import IntegratorOptions
 from ascentwind.runners.cli.exit_codes import INTERRUPTED
@@ -152,13 +152,13 @@ def test_batch_is_stopped_within_a_sweep(as504):
 def test_flag_reaches_what_the_threads_call():
     def compiled(flag) -> int:
         begun.set()
-        while not flag._obj.value:
+        while not flag[0]:
             time.sleep(0.001)
         return -1
 
     begun, futures = threading.Event(), []
     with pytest.raises(ZeroDivisionError), Workers(1) as pool:
-        futures += [pool.submit(call, compiled), pool.submit(call, compiled)]
+        futures += [pool.submit(interruptible, compiled) for _ in range(2)]
         begun.wait()
         raise ZeroDivisionError
     running, waiting = futures

@@ -189,14 +189,16 @@ def test_impossible_options_are_refused(options, words):
         EnsembleOptions(**options)
 
 
+@pytest.mark.filterwarnings("ignore:no C compiler")
 def test_engines_are_named_and_take_their_own_options(study, monkeypatch):
     with pytest.raises(UnknownNameError, match="did you mean 'ensemble'"):
         study.response_statistics([1.0], engine="ensembel")
     with pytest.raises(IntegrationError, match="takes EnsembleOptions, not IntegratorOptions"):
         study.response_statistics([1.0], engine="ensemble", options=IntegratorOptions())
     monkeypatch.setenv("CC", "")
+    interpreted = Study.from_system(study.system)  # the other may have compiled its ensemble before
     with pytest.raises(EnsembleNeedsCompilerError, match="no C compiler"):
-        study.response_statistics([1.0], engine="ensemble")
+        interpreted.response_statistics([1.0], engine="ensemble")
 
 
 def test_a_system_that_grows_beyond_numbers_is_refused():

@@ -8,7 +8,6 @@ import pytest
 from ascentwind.codegen.toolchain.library import NoCompilerError
 from ascentwind.model.errors import IntegrationError, ParameterValueError, UnknownNameError
 from ascentwind.runners import IntegratorOptions, Study, SweepOptions
-from ascentwind.runners.solvers.sweep import _sweep_of
 from ascentwind.runners.statistics.engines import engine_options
 
 TIMES = (30.0, 75.0, 105.6, 134.34, 140.0)
@@ -84,7 +83,6 @@ def test_engines_are_chosen_by_name_and_refuse_what_they_do_not_take(as504):
 
 def test_without_a_compiler_cvodes_is_the_default(monkeypatch):
     monkeypatch.setenv("CC", "")
-    _sweep_of.cache_clear()
     study = Study.load("as504", compile=False)
     assert study.response_statistics([15.0]).attrs["engine"] == "cvodes"
     with pytest.raises(NoCompilerError, match="engine='cvodes'"):
