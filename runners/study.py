@@ -23,6 +23,7 @@ from .solvers.integration import IntegratorOptions
 from .solvers.mean_response import with_mean_tables
 from .solvers.stability import warn_if_unstable
 from .solvers.sweep import SweepOptions, batch, sweep
+from .statistics.dataset import with_members
 from .statistics.engines import Progress, batch_dataset, compute_statistics
 from .statistics.results import ResponseStatistics
 from .statistics.weighting import weighting_dataset, weighting_family
@@ -77,7 +78,7 @@ class Study(Case):
         Returns
         -------
         ResponseStatistics
-            An xarray Dataset over (time, response, source); ``combined`` is the sum over the independent sources.
+            Over (time, response, source); ``combined`` is the sum over the independent sources.
 
         Raises
         ------
@@ -119,7 +120,8 @@ class Study(Case):
         Returns
         -------
         ResponseStatistics
-            As :meth:`response_statistics`, with a dimension ``member`` in front.
+            As :meth:`response_statistics`, with a dimension ``member`` in front and every parameter that was named as a
+            coordinate over it, with its unit.
 
         Raises
         ------
@@ -140,7 +142,8 @@ class Study(Case):
                 solver = AdjointSolver(member, by_cvodes)
                 runs = [solver.run(time) for time in ends]
                 members.append((np.array([run.mean for run in runs]), np.array([run.variance for run in runs])))
-            return batch_dataset(self, ends, members, "cvodes", by_cvodes.relative_tolerance)
+            found = batch_dataset(self, ends, members, "cvodes", by_cvodes.relative_tolerance)
+            return ResponseStatistics(with_members(found, self, parameter_sets))
         options = options or SweepOptions(relative_tolerance=1e-4)
         found = batch(
             sweep_of(self.executable),
@@ -151,7 +154,8 @@ class Study(Case):
             threads=threads,
         )
         members = [(member.mean, member.variance) for member in found]
-        return batch_dataset(self, ends, members, "sweep", options.relative_tolerance)
+        dataset = batch_dataset(self, ends, members, "sweep", options.relative_tolerance)
+        return ResponseStatistics(with_members(dataset, self, parameter_sets))
 
     def weighting_functions(
         self, times: Iterable[float], *, spacing: float = 0.25, options: SweepOptions | None = None

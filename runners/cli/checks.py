@@ -47,7 +47,7 @@ def verify(
             at = [start + (last - start) * k / 60 for k in range(1, 61)]
             title = f"{study.system.name}: simulated flights and the adjoint's mean ± 3σ"
             adjoint = study.response_statistics(at, engine="cvodes")
-            figure = sample_path_figure(found.statistics["ensemble"], adjoint, title)
+            figure = sample_path_figure(found.statistics["ensemble"].dataset, adjoint.dataset, title)
         job.written += write_figure(figure, job.folder, "sample_paths")
         job.end()
     console.print(found.verdict(), style="green" if found.agree else "bold red", highlight=False)
@@ -95,7 +95,7 @@ def tolerance(
     """Error and run time of each engine against tolerance, and the variable that paces the step."""
     from ..case.times import parse_times, time_of_greatest_dynamic_pressure
     from ..present.style import write_figure
-    from ..statistics.figures import tolerance_figure
+    from ..statistics.tolerance_figure import tolerance_figure
     from ..statistics.tolerance import TOLERANCES, measure, pacing
 
     end_times = parse_times(times) if times else []

@@ -8,11 +8,13 @@ from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import xarray as xr
 
 from ...codegen.sweep.compiled import sweep_of
 from ...model.errors import AscentwindWarning, IntegrationError, UnknownNameError
 from ...model.system.linear_system import COMBINED
 from ..case.provenance import provenance
+from ..present.netcdf import RULE
 from ..solvers.adjoint import AdjointSolver
 from ..solvers.covariance import CovarianceOptions, covariance_equation
 from ..solvers.ensemble import EnsembleOptions
@@ -20,7 +22,8 @@ from ..solvers.integration import IntegratorOptions
 from ..solvers.sweep import LEAST_TOLERANCE, SweepOptions, SweepResult, available_sweep, sweep
 from ..solvers.time_nodes import time_nodes
 from .ensemble import ensemble_dataset
-from .results import ResponseStatistics, response_dataset, statistics_dataset
+from .dataset import response_dataset, statistics_dataset
+from .results import ResponseStatistics
 
 if TYPE_CHECKING:
     from ..case.case import Case
@@ -44,7 +47,7 @@ class Engine:
     options : type
         Of its options; made without arguments they are the default.
     compute : callable
-        (study, increasing end times, responses, options, progress) -> ResponseStatistics.
+        (study, increasing end times, responses, options, progress) -> xarray.Dataset of the statistics.
     finer : callable
         (options, flight in s) -> options of a finer discretisation, by which the error of the given ones is judged.
     tight : object or None
@@ -53,7 +56,7 @@ class Engine:
 
     label: str
     options: type
-    compute: Callable[[Case, list[float], list[str], Any, Progress | None], ResponseStatistics]
+    compute: Callable[[Case, list[float], list[str], Any, Progress | None], xr.Dataset]
     finer: Callable[[Any, float], Any]
     tight: object | None
 
@@ -127,19 +130,19 @@ def compute_statistics(
         )
     found = chosen.compute(case, times, responses, settings, progress)
     if check:
-        difference = np.full(found.std.shape, np.inf)
+        difference = np.full(found["std"].shape, np.inf)
         try:
             finer = chosen.compute(case, times, responses, chosen.finer(settings, times[-1] - case.system.start), None)
-            difference = relative_difference(found.std.values, finer.std.values)
+            difference = relative_difference(found["std"].values, finer["std"].values)
         except IntegrationError as error:
             text = f"the statistics could not be checked by a finer discretisation, and none is known to hold: {error}"
             warnings.warn(UncheckedStatisticsWarning(text), stacklevel=4)
         found["discretisation_difference"] = (
-            found.std.dims,
+            found["std"].dims,
             difference,
             {"units": "1", "long_name": "std against a finer discretisation, relative"},
         )
-    return found
+    return ResponseStatistics(found)
 
 
 def relative_difference(value: np.ndarray, reference: np.ndarray) -> np.ndarray:
@@ -151,7 +154,7 @@ def relative_difference(value: np.ndarray, reference: np.ndarray) -> np.ndarray:
 
 def _cvodes(
     case: Case, times: list[float], responses: list[str], options: IntegratorOptions, progress: Progress | None
-) -> ResponseStatistics:
+) -> xr.Dataset:
     solver = AdjointSolver(case.with_means, options)
     runs = []
     for time, node in zip(times, time_nodes(case.executable, times).tolist(), strict=True):
@@ -163,7 +166,7 @@ def _cvodes(
 
 def _sweep(
     case: Case, times: list[float], responses: list[str], options: SweepOptions, progress: Progress | None
-) -> ResponseStatistics:
+) -> xr.Dataset:
     engine = sweep_of(case.executable)
     found = sweep(
         engine,
@@ -179,7 +182,7 @@ def _sweep(
     return sweep_dataset(case, found, responses, options)
 
 
-def sweep_dataset(case: Case, found: SweepResult, responses: list[str], options: SweepOptions) -> ResponseStatistics:
+def sweep_dataset(case: Case, found: SweepResult, responses: list[str], options: SweepOptions) -> xr.Dataset:
     """Return the dataset of a sweep: statistics, covariances between responses, and the error estimate."""
     rows = [case.system.output_index(name) for name in responses]
     attributes = provenance(case) | {
@@ -201,14 +204,14 @@ def sweep_dataset(case: Case, found: SweepResult, responses: list[str], options:
     return dataset
 
 
-def _with_covariance(dataset: ResponseStatistics, covariance: np.ndarray, rows: list[int]) -> ResponseStatistics:
+def _with_covariance(dataset: xr.Dataset, covariance: np.ndarray, rows: list[int]) -> xr.Dataset:
     """Add the covariances between responses, of all outputs (k, sources, outputs, outputs) those in ``rows``."""
     covariance = covariance[:, :, rows][:, :, :, rows]
     covariance = np.concatenate([covariance, covariance.sum(axis=1, keepdims=True)], axis=1)
     dataset["covariance"] = (
         ("time", "source", "response", "other_response"),
         covariance,
-        {"units": "product of the units of the two responses", "long_name": "covariance between responses"},
+        {RULE: "response other_response", "long_name": "covariance between responses"},
     )
     return dataset.assign_coords(other_response=dataset["response"].values)
 
@@ -219,7 +222,7 @@ def batch_dataset(
     members: list[tuple[np.ndarray, np.ndarray]],
     engine: str,
     relative_tolerance: float,
-) -> ResponseStatistics:
+) -> xr.Dataset:
     """Return the dataset of a batch: statistics of all responses with a dimension ``member`` in front.
 
     ``members`` are means (k, responses) and variances (k, responses, sources).
@@ -231,7 +234,7 @@ def batch_dataset(
 
 def _covariance(
     case: Case, times: list[float], responses: list[str], options: CovarianceOptions, progress: Progress | None
-) -> ResponseStatistics:
+) -> xr.Dataset:
     rows = [case.system.output_index(name) for name in responses]
     found = covariance_equation(
         case.with_means, times, options.relative_tolerance, progress, options.longest_interval, options.absolute_part
@@ -243,7 +246,7 @@ def _covariance(
 
 def _ensemble(
     case: Case, times: list[float], responses: list[str], options: EnsembleOptions, progress: Progress | None
-) -> ResponseStatistics:
+) -> xr.Dataset:
     found = ensemble_dataset(case, times, responses, options)
     if progress:
         progress(times[-1])

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import numpy as np
+import xarray as xr
 
 from ..case.case import Case
 from ..case.provenance import provenance
+from ..present.netcdf import RULE
 from ..solvers.ensemble import EnsembleOptions, mean_interval, run_ensemble, std_interval
-from .results import ResponseStatistics, statistics_dataset
+from .dataset import statistics_dataset
 
 
 def ensemble_dataset(
     case: Case, times: list[float], responses: list[str], options: EnsembleOptions
-) -> ResponseStatistics:
+) -> xr.Dataset:
     """Return the statistics of an ensemble as a dataset.
 
     Besides the variables of every engine: ``mean_low``, ``mean_high``, ``std_low``, ``std_high``, the confidence
@@ -39,7 +41,7 @@ def ensemble_dataset(
             label = f"{side} end of the {options.confidence:.0%} confidence interval of {name}"
             dataset[f"{name}_{side}"] = (dims, values, dataset[name].attrs | {"long_name": label})
     if options.paths:
-        label = {"long_name": "sample paths, all sources together", "units": dataset["mean"].attrs["units"]}
+        label = {"long_name": "sample paths, all sources together", RULE: "response"}
         dataset["sample_path"] = (("path", "t", "response"), found.paths[:, :, rows], label)
         dataset = dataset.assign_coords(t=("t", found.path_times, {"units": "s", "long_name": "flight time"}))
     return dataset

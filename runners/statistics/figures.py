@@ -1,4 +1,4 @@
-"""Figures of response statistics, weighting functions, sample paths and tolerances."""
+"""Figures of response statistics, weighting functions and sample paths."""
 
 from __future__ import annotations
 
@@ -8,17 +8,14 @@ import numpy as np
 import xarray as xr
 from matplotlib import rc_context
 from matplotlib.figure import Figure
-from matplotlib.ticker import NullFormatter
 
 from ...model.system.linear_system import COMBINED
 from ..present.style import COLORS, STYLE, display, words, wrapped
 from .larger_side import LABEL, SIGMAS, sign
 from .peaks import peaks
-from .results import ResponseStatistics
-from .tolerance import Measurement, Pace
 
 
-def response_figure(statistics: ResponseStatistics, response: str, title: str) -> Figure:
+def response_figure(statistics: xr.Dataset, response: str, title: str) -> Figure:
     """Return the mean, and the side of the peak of |mean| + 3 sigma from the first source and from all, over time."""
     part = statistics.sel(response=response)
     (peak,) = peaks(statistics.sel(response=[response]))
@@ -76,7 +73,7 @@ def weighting_figure(families: Sequence[xr.Dataset], response: str, unit: str, t
     return figure
 
 
-def sample_path_figure(ensemble: ResponseStatistics, statistics: ResponseStatistics, title: str) -> Figure:
+def sample_path_figure(ensemble: xr.Dataset, statistics: xr.Dataset, title: str) -> Figure:
     """Return the sample paths of an ensemble within mean and mean ± 3 sigma computed without it."""
     names = [str(name) for name in ensemble["response"].values]
     with rc_context(STYLE):
@@ -98,39 +95,5 @@ def sample_path_figure(ensemble: ResponseStatistics, statistics: ResponseStatist
         panels[0].plot([], [], color="#7f8c9a", label=f"{ensemble.sizes['path']} simulated flights")
         panels[0].legend(loc="upper left")
         panels[-1].set_xlabel("flight time (s)")
-        figure.suptitle(title)
-    return figure
-
-
-def tolerance_figure(measurements: Sequence[Measurement], paces: Sequence[Pace], title: str) -> Figure:
-    """Return error and run time against tolerance for each engine, and the steps over flight time with their limit."""
-    with rc_context(STYLE):
-        figure = Figure(figsize=(13.0, 4.8), layout="constrained")
-        error, seconds, steps = figure.subplots(1, 3)
-        for k, label in enumerate(dict.fromkeys(m.engine for m in measurements)):
-            rows = [m for m in measurements if m.engine == label]
-            tolerance = [m.tolerance for m in rows]
-            mark = {"marker": "osD^vP"[k % 6], "ms": 4.5, "color": f"C{k}", "label": label}
-            error.loglog(tolerance, [m.error for m in rows], **mark)
-            seconds.loglog(tolerance, [1e3 * m.seconds for m in rows], **mark)
-        ends = sorted({m.tolerance for m in measurements})
-        error.loglog(ends, ends, ":", color="black", label="error = tolerance")
-        error.set(xlabel="relative tolerance", ylabel="largest relative error of a σ")
-        seconds.set(xlabel="relative tolerance", ylabel="run time (ms)")
-        for axes in (error, seconds):
-            axes.invert_xaxis()
-        seconds.yaxis.set_minor_formatter(NullFormatter())
-        error.legend(fontsize=8.5)
-        edges = [paces[0].begin, *(p.end for p in paces)]
-        for values, label, color in (
-            ([p.newton_step for p in paces], "Adams, Newton", "C0"),
-            ([p.functional_step for p in paces], "Adams, functional", "C1"),
-            ([p.functional_limit for p in paces], "limit of functional iteration, 2 / |root|", "black"),
-        ):
-            line = ":" if color == "black" else "-"
-            steps.stairs([1e3 * v for v in values], edges, baseline=None, label=label, color=color, ls=line, lw=1.8)
-        steps.set(xlabel="flight time (s)", ylabel="mean step of CVODES (ms)")
-        steps.set_ylim(0, 1.35e3 * max(max(p.functional_limit, p.newton_step, p.functional_step) for p in paces))
-        steps.legend(fontsize=8.5)
         figure.suptitle(title)
     return figure

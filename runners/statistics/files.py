@@ -1,4 +1,4 @@
-"""Response statistics as files: netCDF, and CSV with units in the header."""
+"""Response statistics as files: netCDF with one unit a variable, and CSV with units in a column."""
 
 from __future__ import annotations
 
@@ -7,31 +7,81 @@ import io
 from pathlib import Path
 
 import numpy as np
+import xarray as xr
 
+from ...model.errors import DataError
 from ..present.files import write_whole
-from .results import ResponseStatistics
+from ..present.netcdf import joined, one_unit_a_variable, with_conventions, write_netcdf
 
+NAME = "statistics.nc"
 COLUMNS = ("time_s", "response", "unit", "source", "mean", "variance", "std", "mean_plus_3sigma")
 
 
-def write_statistics(statistics: ResponseStatistics, folder: Path) -> list[Path]:
-    """Write statistics.nc (NetCDF) and statistics.csv (one row a time, response and source)."""
+def write_statistics(statistics: xr.Dataset, folder: Path) -> list[Path]:
+    """Write statistics.nc (NetCDF) and statistics.csv (one row a member, time, response and source)."""
     text = statistics_csv(statistics)
     return [
-        write_whole(folder / "statistics.nc", lambda p: statistics.to_netcdf(p, engine="scipy")),
+        write_netcdf(by_response(statistics), folder / NAME),
         write_whole(folder / "statistics.csv", lambda p: p.write_text(text, encoding="utf-8")),
     ]
 
 
-def statistics_csv(statistics: ResponseStatistics) -> str:
-    """Return the statistics as tidy CSV."""
+def by_response(statistics: xr.Dataset) -> xr.Dataset:
+    """Return statistics as files hold them: one variable a response and quantity, each with its unit."""
+    found = whole(statistics)
+    units = [str(unit) for unit in found["unit"].values]
+    dims = {"response": units} | ({"other_response": units} if "other_response" in found.dims else {})
+    return with_conventions(one_unit_a_variable(found, dims))
+
+
+def whole(statistics: xr.Dataset) -> xr.Dataset:
+    """Return statistics with the dimensions time, response and source where one entry of them had been chosen."""
+    chosen = [d for d in ("time", "response", "source") if d in statistics.coords and d not in statistics.dims]
+    order = ("member", "time", "response", "source")
+    grown = statistics.expand_dims(chosen)
+    if "response" in chosen:  # its unit goes with it
+        grown = grown.assign_coords(unit=("response", [str(statistics["unit"].item())]))
+    return grown.transpose(*(d for d in order if d in grown.dims), ...) if chosen else grown
+
+
+def read_statistics(path: Path) -> xr.Dataset:
+    """Read what :func:`write_statistics` wrote, from the file or its folder.
+
+    Raises
+    ------
+    DataError
+        There is no such file, or it holds no response statistics.
+    """
+    path = path / NAME if path.is_dir() else path
+    try:
+        with xr.open_dataset(path, engine="scipy", decode_times=False) as stored:
+            found = joined(stored.load())
+    except FileNotFoundError:
+        raise DataError("there is no such file; 'ascentwind run' writes one", file=path) from None
+    except (OSError, TypeError, ValueError, IndexError, KeyError) as error:
+        raise DataError(f"cannot be read as NetCDF ({error})", file=path) from None
+    if not {"mean", "std", "response", "source", "time"} <= set(found.variables):
+        raise DataError("holds no response statistics of this version; compute them again", file=path)
+    units = [stored[v].attrs for v in stored.data_vars if stored[v].attrs.get("quantity") == "std"]
+    by_name = {attributes["response"]: attributes["response_unit"] for attributes in units}
+    found.attrs = {k: v for k, v in found.attrs.items() if k not in ("Conventions", "history")}
+    return found.assign_coords(unit=("response", [by_name[str(r)] for r in found["response"].values]))
+
+
+def statistics_csv(statistics: xr.Dataset) -> str:
+    """Return the statistics as tidy CSV; the rows of a batch begin with the number of the member."""
+    found = whole(statistics)
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
-    writer.writerow(COLUMNS)
-    values = {name: statistics[name].values for name in COLUMNS[4:]}
-    for k, time in enumerate(statistics["time"].values):
-        for r, response in enumerate(statistics["response"].values):
-            for s, source in enumerate(statistics["source"].values):
-                numbers = (np.format_float_scientific(values[name][k, r, s], 9) for name in COLUMNS[4:])
-                writer.writerow([f"{time:.12g}", response, statistics["unit"].values[r], source, *numbers])
+    members = "member" in found.dims
+    writer.writerow(("member", *COLUMNS) if members else COLUMNS)
+    for m in range(found.sizes["member"]) if members else (None,):
+        part = found if m is None else found.isel(member=m)
+        values = {name: part[name].values for name in COLUMNS[4:]}
+        for k, time in enumerate(part["time"].values):
+            for r, response in enumerate(part["response"].values):
+                for s, source in enumerate(part["source"].values):
+                    numbers = (np.format_float_scientific(values[name][k, r, s], 9) for name in COLUMNS[4:])
+                    row = [f"{time:.12g}", response, part["unit"].values[r], source, *numbers]
+                    writer.writerow(row if m is None else [m, *row])
     return buffer.getvalue()

@@ -14,6 +14,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from ..present.netcdf import RULE
 from ..present.style import display, words
 from ..solvers.adjoint import AdjointHistory, AdjointSolver
 from ..solvers.covariance import covariance_equation
@@ -22,9 +23,9 @@ from ..solvers.integration import IntegratorOptions
 from ..solvers.mean_response import with_mean_tables
 from .engines import relative_difference
 from .larger_side import larger_side, sign
-from .peaks import Peak, peaks
+from .peaks import Peak
 from .results import ResponseStatistics
-from .weighting import weighting_dataset
+from .weighting import NOISE_RULE, input_units, weighting_dataset
 
 if TYPE_CHECKING:
     from ..case.case import Case
@@ -109,7 +110,7 @@ def check_peaks(case: Case, statistics: ResponseStatistics) -> PeakCheck:
     ------
     IntegrationError
     """
-    found = tuple(peaks(statistics))
+    found = tuple(statistics.peaks())
     rows = [case.system.output_index(peak.response) for peak in found]
     times = sorted({peak.time for peak in found})
     at = [times.index(peak.time) for peak in found]
@@ -157,26 +158,27 @@ def with_peak_check(statistics: ResponseStatistics, check: PeakCheck, case: Case
     """
     by_response = {
         "peak_time": ([p.time for p in check.peaks], {"units": "s", "long_name": "time of the peak"}),
-        "peak": ([p.value for p in check.peaks], {"long_name": "largest |mean| + 3 sigma over the end times"}),
+        "peak": ([p.value for p in check.peaks], {RULE: "response", "long_name": "largest |mean| + 3 sigma over the end times"}),
         "peak_side": (
             np.array([sign(p.mean) for p in check.peaks], np.int8),
-            {"long_name": "1: mean + 3 sigma is the larger side at the peak, -1: mean - 3 sigma"},
+            {"units": "1", "long_name": "1: mean + 3 sigma is the larger side at the peak, -1: mean - 3 sigma"},
         ),
-        "peak_reference_mean": (check.mean, {"long_name": f"mean at the peak by {ROADS[check.reference]}"}),
-        "peak_reference_std": (check.std, {"long_name": f"standard deviation there by {ROADS[check.reference]}"}),
+        "peak_reference_mean": (check.mean, {RULE: "response", "long_name": f"mean at the peak by {ROADS[check.reference]}"}),
+        "peak_reference_std": (check.std, {RULE: "response", "long_name": f"standard deviation there by {ROADS[check.reference]}"}),
         "peak_std_difference": (check.std_difference, {"units": "1", "long_name": "of the standard deviations"}),
         "peak_difference": (check.peak_difference, {"units": "1", "long_name": "of |mean| + 3 sigma"}),
     }
+    dataset = statistics.dataset
     variables = {name: ("response", values, attrs) for name, (values, attrs) in by_response.items()}
     if check.histories:
         variables |= _weighting(check, case)
         noises = case.system.noises
-        statistics = statistics.assign_coords(
+        dataset = dataset.assign_coords(
             noise=[n.name for n in noises],
             noise_source=("noise", [n.source for n in noises]),
             input=list(case.system.input_names),
         )
-    return statistics.assign(variables).assign_attrs(peak_reference=check.reference)
+    return ResponseStatistics(dataset.assign(variables).assign_attrs(peak_reference=check.reference))
 
 
 def _weighting(check: PeakCheck, case: Case) -> dict[str, tuple]:
@@ -191,8 +193,8 @@ def _weighting(check: PeakCheck, case: Case) -> dict[str, tuple]:
             found[r, ..., : len(part)] = part.T
         return found
 
-    attributes = {"long_name": "weighting function of the response at its peak, from white noise"}
-    known = {"long_name": "weighting function of the response at its peak, from the input"}
+    attributes = {RULE: NOISE_RULE, "long_name": "weighting function of the response at its peak, from white noise"}
+    known = input_units(case) | {"long_name": "weighting function of the response at its peak, from the input"}
     return {
         "peak_weighting_time": (
             ("response", "point"),

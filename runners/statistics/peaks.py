@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import xarray as xr
 
 from ...model.system.linear_system import COMBINED
 from .larger_side import larger_side, side
-from .results import ResponseStatistics
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class Peak:
         return side(self.mean)
 
 
-def peaks(statistics: ResponseStatistics) -> list[Peak]:
+def peaks(statistics: xr.Dataset) -> list[Peak]:
     """Return the peak of every response."""
     found = []
     times, sources = statistics["time"].values, [str(s) for s in statistics["source"].values]

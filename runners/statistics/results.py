@@ -1,104 +1,224 @@
-"""Results as labelled datasets: names, units and provenance travel with the numbers."""
+"""Response statistics as an object: arrays by name, peaks, a figure, files."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
 
+from ...model.errors import ParameterValueError, UnknownNameError
 from ...model.system.linear_system import COMBINED
-from ..case.provenance import provenance
-from ..solvers.adjoint import AdjointRun
-from ..solvers.integration import COUNTERS, IntegratorOptions
+from ..present.files import prepare_folder
+from ..present.notebook import html_page, shortened
+from .dataset import QUANTITIES
+from .files import by_response, read_statistics, whole, write_statistics
+from .peaks import Peak, peaks
 
 if TYPE_CHECKING:
-    from ..case.case import Case
+    import pandas as pd
+    from matplotlib.figure import Figure
 
 
-class ResponseStatistics(xr.Dataset):
-    """Mean, variance, std and mean_plus_3sigma over (time, response, source).
+@dataclass(frozen=True, eq=False, repr=False)
+class ResponseStatistics:
+    """Mean, variance, standard deviation and mean + 3 sigma over (time, response, source).
 
-    An xarray Dataset whose variables are attributes, ``mean`` and ``std`` included; to average over a dimension
-    with xarray's own methods of these names, use ``xarray.Dataset(stats).mean(...)``.
-    """
-
-    __slots__ = ()
-
-    @property
-    def mean(self) -> xr.DataArray:  # type: ignore[override]
-        return self["mean"]
-
-    @property
-    def std(self) -> xr.DataArray:  # type: ignore[override]
-        return self["std"]
-
-
-def response_dataset(
-    case: Case, runs: Sequence[AdjointRun], responses: Sequence[str], options: IntegratorOptions
-) -> ResponseStatistics:
-    """Put adjoint runs together."""
-    rows = [case.system.output_index(name) for name in responses]
-    variance = np.array([run.variance[rows] for run in runs])
-    mean = np.array([run.mean[rows] for run in runs])
-    attributes = provenance(case) | {
-        "engine": "cvodes",
-        "code": case.executable.engine,
-        "method": options.method,
-        "iteration": options.iteration,
-        "relative_tolerance": options.relative_tolerance,
-    }
-    dataset = statistics_dataset(case, [run.time for run in runs], responses, mean, variance, attributes)
-    for name in COUNTERS:
-        dataset[name] = ("time", [run.counters[name] for run in runs])
-    return dataset
-
-
-def statistics_dataset(
-    case: Case,
-    times: Sequence[float],
-    responses: Sequence[str],
-    mean: np.ndarray,
-    variance: np.ndarray,
-    attributes: dict[str, object],
-) -> ResponseStatistics:
-    """Return the dataset of statistics.
-
-    Parameters
+    Attributes
     ----------
-    mean : (k, responses) or (members, k, responses) array
-    variance : (k, responses, sources) or (members, k, responses, sources) array
-        The combined variance is added here.
+    dataset : xarray.Dataset
+        All arrays, with ``response``, ``source`` and ``time`` (s) as coordinates and ``unit`` over ``response``; a batch
+        has ``member`` in front, with its parameter values. The attributes are what it was computed from.
+
+    Examples
+    --------
+    >>> stats.std.sel(response="bending_moment", source="wind", time=75)  # doctest: +SKIP
+    >>> stats["bending_moment_std"].sel(source="wind", time=75)  # with units, as in the file  # doctest: +SKIP
     """
-    system = case.system
-    variance = np.concatenate([variance, variance.sum(axis=-1, keepdims=True)], axis=-1)
-    std = np.sqrt(variance)
-    mean = np.broadcast_to(mean[..., None], variance.shape).copy()
-    units = [system.outputs[system.output_index(name)].unit for name in responses]
-    dims = ("member", "time", "response", "source")[-variance.ndim :]
-    dataset = ResponseStatistics(
-        {
-            "mean": (dims, mean),
-            "variance": (dims, variance),
-            "std": (dims, std),
-            "mean_plus_3sigma": (dims, mean + 3 * std),
-        },
-        {
-            "time": ("time", np.asarray(times, float), {"units": "s", "long_name": "flight time t2"}),
-            "response": list(responses),
-            "source": [*system.sources, COMBINED],
-            "unit": ("response", units),
-        },
-        attributes,
-    )
-    by_response = "; ".join(f"{name}: {unit}" for name, unit in zip(responses, units, strict=True))
-    squared = "; ".join(f"{name}: ({unit})^2" for name, unit in zip(responses, units, strict=True))
-    for name, label in (
-        ("mean", "mean response to the mean wind"),
-        ("variance", "variance about the mean"),
-        ("std", "standard deviation"),
-        ("mean_plus_3sigma", "mean plus three standard deviations"),
-    ):
-        dataset[name].attrs |= {"units": squared if name == "variance" else by_response, "long_name": label}
-    return dataset
+
+    dataset: xr.Dataset
+
+    @property
+    def mean(self) -> xr.DataArray:
+        """Mean, (time, response, source), in each response's ``unit``."""
+        return self.dataset["mean"]
+
+    @property
+    def std(self) -> xr.DataArray:
+        """Standard deviation, (time, response, source), in each response's ``unit``."""
+        return self.dataset["std"]
+
+    @property
+    def variance(self) -> xr.DataArray:
+        """Variance, (time, response, source), in each response's ``unit`` squared."""
+        return self.dataset["variance"]
+
+    @property
+    def mean_plus_3sigma(self) -> xr.DataArray:
+        """Mean + 3 sigma, literally, (time, response, source), in each response's ``unit``."""
+        return self.dataset["mean_plus_3sigma"]
+
+    @property
+    def attrs(self) -> dict[str, Any]:
+        """What the statistics were computed from: engine, system, hashes, versions."""
+        return self.dataset.attrs
+
+    def by_response(self) -> xr.Dataset:
+        """Return the dataset that files hold: ``bending_moment_std`` (time, source) and so on, each with CF ``units``."""
+        return by_response(self.dataset)
+
+    def __getitem__(self, name: str) -> xr.DataArray:
+        """Return a variable or coordinate, of :attr:`dataset` or of :meth:`by_response`.
+
+        Raises
+        ------
+        UnknownNameError
+        """
+        if name in self.dataset.variables:
+            return self.dataset[name]
+        found = self.by_response()
+        if name in found.variables:
+            return found[name]
+        raise UnknownNameError("variable", str(name), [*map(str, self.dataset.variables), *map(str, found.variables)])
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.dataset.variables or name in self.by_response().variables
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(map(str, self.dataset.data_vars))
+
+    def __getattr__(self, name: str) -> Any:
+        """Give what an xarray.Dataset has, as this class did when it was one, with a warning."""
+        if name.startswith("_") or name == "dataset" or not hasattr(self.dataset, name):
+            raise AttributeError(f"'{type(self).__name__}' has no attribute '{name}'", name=name, obj=self)
+        if name in self.dataset.variables:
+            return self.dataset[name]
+        text = f"statistics.{name} is statistics.dataset.{name} now, and will go with the next release"
+        warnings.warn(text, DeprecationWarning, stacklevel=2)
+        return getattr(self.dataset, name)
+
+    def sel(self, **labels: Any) -> ResponseStatistics:
+        """Return the statistics at labels, as xarray selects: ``sel(response="bending_moment", time=75)``.
+
+        Raises
+        ------
+        UnknownNameError
+            A response or source that is not there.
+        """
+        for dim, kind in (("response", "response"), ("source", "noise source")):
+            known = [str(name) for name in np.atleast_1d(self.dataset[dim].values)]
+            asked = labels.get(dim, [])
+            for name in [asked] if isinstance(asked, str) else asked if isinstance(asked, list | tuple) else []:
+                if name not in known:
+                    raise UnknownNameError(kind, name, known)
+        return ResponseStatistics(self.dataset.sel(labels))
+
+    def peaks(self) -> list[Peak]:
+        """Return the largest |mean| + 3 sigma of every response over the end times, and which source drives it.
+
+        Raises
+        ------
+        ParameterValueError
+            Of a batch, or without all sources.
+        """
+        return peaks(self._one_table())
+
+    def plot(self, response: str, title: str | None = None) -> Figure:
+        """Return the figure of a response over time: mean, and the larger side from the first source and from all.
+
+        Parameters
+        ----------
+        response : str
+        title : str, optional
+
+        Raises
+        ------
+        UnknownNameError
+        ParameterValueError
+            Of a batch, or without all sources.
+        """
+        from .figures import response_figure
+
+        table = ResponseStatistics(self._one_table()).sel(response=[response])
+        return response_figure(table.dataset, response, title or str(self.attrs.get("title", self.attrs.get("system", ""))))
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return a tidy table: a row a member, time (s), response and source, in SI, with the unit of the response."""
+        found = whole(self.dataset)
+        frame = found[list(QUANTITIES)].to_dataframe().reset_index()
+        first = ["member"] if "member" in found.dims else []
+        others = [c for c in frame.columns if c not in (*first, "time", "response", "unit", "source", *QUANTITIES)]
+        return frame[[*first, *others, "time", "response", "unit", "source", *QUANTITIES]]
+
+    def save(self, folder: str | Path) -> list[Path]:
+        """Write ``statistics.nc`` and ``statistics.csv`` and return where they are.
+
+        Raises
+        ------
+        OutputFolderError
+        """
+        prepare_folder(Path(folder))
+        return write_statistics(self.dataset, Path(folder))
+
+    @classmethod
+    def open(cls, path: str | Path) -> ResponseStatistics:
+        """Read what :meth:`save` or ``ascentwind run`` wrote.
+
+        Parameters
+        ----------
+        path : str or path
+            ``statistics.nc`` or its folder.
+
+        Raises
+        ------
+        DataError
+        """
+        return cls(read_statistics(Path(path)))
+
+    def _one_table(self) -> xr.Dataset:
+        if "member" in self.dataset.dims:
+            raise ParameterValueError("the statistics are of a batch; choose one, e.g. statistics.sel(member=0)")
+        found = whole(self.dataset)
+        if COMBINED not in found["source"].values:
+            raise ParameterValueError(f"a peak is from all sources together; keep the source '{COMBINED}'")
+        return found
+
+    def _summary(self) -> dict[str, str]:
+        found, attrs = whole(self.dataset), self.attrs
+        times = found["time"].values
+        span = f"{times[0]:g} s" if times.size == 1 else f"{times.size}, {times[0]:g} to {times[-1]:g} s"
+        pairs = zip(found["response"].values, found["unit"].values, strict=True)
+        members = {"members": str(found.sizes["member"])} if "member" in found.dims else {}
+        return {
+            **members,
+            "end times": span,
+            "responses": shortened([f"{name} [{unit}]" for name, unit in pairs]),
+            "sources": shortened([str(name) for name in found["source"].values]),
+            "arrays": shortened([str(name) for name in self.dataset.data_vars]),
+            "engine": ", ".join(f"{attrs[n]}" for n in ("engine", "relative_tolerance") if n in attrs),
+        }
+
+    def _peak_rows(self) -> list[tuple[str, ...]]:
+        found = whole(self.dataset)
+        if "member" in found.dims or COMBINED not in found["source"].values or not found["time"].size:
+            return []
+        head = ("peak of |mean| + 3 sigma", "value", "unit", "at (s)", "mean", "sigma")
+        rows = [(p.response, p.value, p.unit, p.time, p.mean, p.std) for p in peaks(found.isel(response=slice(8)))]
+        return [head, *(tuple(x if isinstance(x, str) else f"{x:.4g}" for x in row) for row in rows)]
+
+    def _heading(self) -> str:
+        return f"ResponseStatistics of {self.attrs.get('system', 'a system')}"
+
+    def __repr__(self) -> str:
+        lines = [f"{label:10} {text}" for label, text in self._summary().items()]
+        rows = self._peak_rows()
+        widths = [max(len(row[c]) for row in rows) for c in range(len(rows[0]))] if rows else []
+        lines += ["  ".join(x.ljust(w) for x, w in zip(row, widths, strict=True)).rstrip() for row in rows]
+        return "\n  ".join([self._heading(), *lines])
+
+    def _repr_html_(self) -> str:
+        return html_page(self._heading(), self._summary(), self._peak_rows(), self.attrs)

@@ -8,7 +8,7 @@ import pytest
 
 from ascentwind.model import define_system
 from ascentwind.runners import Study
-from ascentwind.runners.statistics.figures import tolerance_figure
+from ascentwind.runners.statistics.tolerance_figure import tolerance_figure
 from ascentwind.runners.statistics.tolerance import measure, pacing, variants
 
 

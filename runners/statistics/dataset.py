@@ -1,0 +1,104 @@
+"""Statistics as labelled arrays: names, units and provenance travel with the numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+import xarray as xr
+
+from ...model.system.linear_system import COMBINED
+from ..case.provenance import provenance
+from ..present.netcdf import RULE, written_unit, unit_factors
+from ..solvers.adjoint import AdjointRun
+from ..solvers.integration import COUNTERS, IntegratorOptions
+
+if TYPE_CHECKING:
+    from ..case.case import Case
+
+QUANTITIES = {
+    "mean": "mean response to the mean wind",
+    "variance": "variance about the mean",
+    "std": "standard deviation",
+    "mean_plus_3sigma": "mean plus three standard deviations",
+}
+
+
+def response_dataset(
+    case: Case, runs: Sequence[AdjointRun], responses: Sequence[str], options: IntegratorOptions
+) -> xr.Dataset:
+    """Put adjoint runs together."""
+    rows = [case.system.output_index(name) for name in responses]
+    variance = np.array([run.variance[rows] for run in runs])
+    mean = np.array([run.mean[rows] for run in runs])
+    attributes = provenance(case) | {
+        "engine": "cvodes",
+        "code": case.executable.engine,
+        "method": options.method,
+        "iteration": options.iteration,
+        "relative_tolerance": options.relative_tolerance,
+    }
+    dataset = statistics_dataset(case, [run.time for run in runs], responses, mean, variance, attributes)
+    for name in COUNTERS:
+        dataset[name] = ("time", [run.counters[name] for run in runs])
+    return dataset
+
+
+def statistics_dataset(
+    case: Case,
+    times: Sequence[float],
+    responses: Sequence[str],
+    mean: np.ndarray,
+    variance: np.ndarray,
+    attributes: dict[str, object],
+) -> xr.Dataset:
+    """Return the dataset of statistics.
+
+    Parameters
+    ----------
+    mean : (k, responses) or (members, k, responses) array
+    variance : (k, responses, sources) or (members, k, responses, sources) array
+        The combined variance is added here.
+    """
+    system = case.system
+    variance = np.concatenate([variance, variance.sum(axis=-1, keepdims=True)], axis=-1)
+    std = np.sqrt(variance)
+    mean = np.broadcast_to(mean[..., None], variance.shape).copy()
+    units = [system.outputs[system.output_index(name)].unit for name in responses]
+    dims = ("member", "time", "response", "source")[-variance.ndim :]
+    dataset = xr.Dataset(
+        {
+            "mean": (dims, mean),
+            "variance": (dims, variance),
+            "std": (dims, std),
+            "mean_plus_3sigma": (dims, mean + 3 * std),
+        },
+        {
+            "time": ("time", np.asarray(times, float), {"units": "s", "long_name": "flight time t2"}),
+            "response": list(responses),
+            "source": [*system.sources, COMBINED],
+            "unit": ("response", units),
+        },
+        attributes,
+    )
+    for name, meaning in QUANTITIES.items():
+        dataset[name].attrs |= {RULE: "response^2" if name == "variance" else "response", "long_name": meaning}
+    return dataset
+
+
+def with_members(dataset: xr.Dataset, case: Case, parameter_sets: Sequence[Mapping[str, float]]) -> xr.Dataset:
+    """Return the dataset of a batch with its parameter values as coordinates over ``member``.
+
+    Every parameter that a set names is a coordinate of that name, with the case's own value where a set leaves it; one
+    whose name the dataset has already is ``parameter_NAME``.
+    """
+    names = dict.fromkeys(name for changes in parameter_sets for name in changes)
+    coordinates: dict[str, tuple] = {"member": ("member", np.arange(len(parameter_sets)), {"long_name": "set of values"})}
+    for name in names:
+        parameter = case.parameters[name]
+        values = [float(changes.get(name, parameter.value)) for changes in parameter_sets]
+        attributes = {"units": written_unit(unit_factors(parameter.unit)), "long_name": parameter.description or name}
+        free = name if name not in dataset.variables and name not in dataset.dims else f"parameter_{name}"
+        coordinates[free] = ("member", values, attributes)
+    return dataset.assign_coords(coordinates)
