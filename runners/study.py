@@ -29,7 +29,7 @@ from .statistics.results import ResponseStatistics
 from .statistics.weighting import weighting_dataset, weighting_family
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Study(Case):
     """Response statistics of a system by the method of adjoint systems.
 

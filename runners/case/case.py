@@ -22,17 +22,19 @@ from ...model.vehicle.reader import load_vehicle
 from ...model.vehicle.shipped import find_vehicle
 from ...model.vehicle.vehicle import Vehicle
 from ...model.wind.statistics import WindModel
+from ..present.notebook import html_page
 from ..solvers.mean_response import with_mean_tables
 from ..solvers.planar_mean import with_nonlinear_mean
 from ..solvers.stability import Root, check_coupling, matrices_at, roots
 from ..solvers.sweep import available_sweep, with_sweep_mean_tables
 from ..solvers.time_nodes import on_flight
+from .summary import summary
 from .wind_start import covariance_at
 
 POSITIVE = ("correlation_time", "reference_area")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Case:
     """A system with numbers; :class:`~ascentwind.runners.Study` asks the questions.
 
@@ -51,6 +53,13 @@ class Case:
             "a study holds symbols and compiled code, which do not travel between processes; send study.vehicle and "
             "parameter values and make it there with Study.from_vehicle, or let 'ascentwind study' do so"
         )
+
+    def __repr__(self) -> str:
+        lines = [f"{label:10} {text}" for label, text in summary(self.executable, self.vehicle).items()]
+        return "\n  ".join([f"{type(self).__name__} of {self.system.name}", *lines])
+
+    def _repr_html_(self) -> str:
+        return html_page(f"{type(self).__name__} of {self.system.name}", summary(self.executable, self.vehicle))
 
     @classmethod
     def load(cls, vehicle: str | Path, *, compile: bool = True, changes: Mapping[str, Any] | None = None) -> Self:

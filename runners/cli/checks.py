@@ -95,8 +95,8 @@ def tolerance(
     """Error and run time of each engine against tolerance, and the variable that paces the step."""
     from ..case.times import parse_times, time_of_greatest_dynamic_pressure
     from ..present.style import write_figure
-    from ..statistics.tolerance_figure import tolerance_figure
     from ..statistics.tolerance import TOLERANCES, measure, pacing
+    from ..statistics.tolerance_figure import tolerance_figure
 
     end_times = parse_times(times) if times else []
     study = load_study(vehicle, changes)

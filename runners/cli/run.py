@@ -41,8 +41,7 @@ def run(
     from ..case.times import parse_times
     from ..present.style import words, write_figure
     from ..statistics.engines import engine_options
-    from ..statistics.figures import response_figure, weighting_figure
-    from ..statistics.files import write_statistics
+    from ..statistics.figures import weighting_figure
     from ..statistics.larger_side import LABEL
     from ..statistics.peak_check import weighting_at, with_peak_check
     from ..views.along_vehicle_files import prepare_along_vehicle, write_along_vehicle
@@ -64,18 +63,17 @@ def run(
             end_times, engine=engine, options=options, progress=lambda t: bar.done(f"end time {t:g} s")
         )
     job.replace_earlier("run", study.system.name)
-    job.written += write_statistics(statistics, job.folder)
+    job.written += statistics.save(job.folder)
     with console.status("peaks again by another road"):
         check = _check_peaks(study, statistics)
     if check is not None:
         statistics = with_peak_check(statistics, check, study)
-        write_statistics(statistics, job.folder)
+        statistics.save(job.folder)
         families = sorted({*families, *(p.time for p in check.peaks[:1] if p.time > study.system.start)})
     with steps("figures", len(study.system.outputs) + len(families) + 1) as bar:
         for output in study.system.outputs:
             title = f"{study.vehicle.title}\n{words(output.name).capitalize()}, mean and {LABEL}"
-            figure = response_figure(statistics, output.name, title)
-            job.written += write_figure(figure, job.folder, output.name)
+            job.written += write_figure(statistics.plot(output.name, title), job.folder, output.name)
             bar.done()
         weighting = []
         for t in families:
@@ -116,12 +114,11 @@ def _check_peaks(study: Study, statistics: ResponseStatistics) -> PeakCheck | No
         return None
 
 
-def _print_peaks(statistics) -> None:
+def _print_peaks(statistics: ResponseStatistics) -> None:
     from ..present.style import display, words
     from ..statistics.larger_side import LABEL
-    from ..statistics.peaks import peaks
 
-    found = peaks(statistics)
+    found = statistics.peaks()
     table = Table("response", title=f"Peaks of {LABEL}")
     for column in ("time", LABEL, "side", "mean", "σ"):
         table.add_column(column, justify="right", no_wrap=True)

@@ -17,7 +17,9 @@ from ...model.system.linear_system import COMBINED
 from ..case.provenance import provenance
 from ..case.times import parse_times
 from ..present.files import write_bytes
+from ..present.netcdf import RULE, one_unit_a_variable, with_conventions
 from ..solvers.sweep import SweepOptions
+from ..statistics.dataset import QUANTITIES
 from ..study import Study
 from .cluster import compute_on_cluster
 from .compute import FAILED, STATUS, Chunk, ChunkResult, Task, chunks, compute_chunk
@@ -111,7 +113,7 @@ def run_parameter_study(
     with open_store(folder, identity_of(study, plan, task, values)) as store:
         found = _complete(store, study, task, list(chunks(values)), len(values), scheduler, progress)
         data = _dataset(study, plan, task, values, found)
-        write_bytes(folder / RESULT_FILE, netcdf_bytes(data))
+        write_bytes(folder / RESULT_FILE, netcdf_bytes(stored_layout(data)))
     return ParameterStudy(plan, study, quantities, data)
 
 
@@ -186,10 +188,9 @@ def _dataset(
     std = _std(study, sources, np.concatenate([r.variance for r in found]))
     nominal = _nominal(study, task)
     units = [study.system.outputs[study.system.output_index(r)].unit for r in task.responses]
-    by_response = "; ".join(f"{name}: {unit}" for name, unit in zip(task.responses, units, strict=True))
     data = xr.Dataset(
         {
-            "value": (("member", "quantity"), values, {"long_name": "value of a quantity"}),
+            "value": (("member", "quantity"), values, {RULE: "quantity", "long_name": "value in a member"}),
             "status": (
                 "member",
                 np.concatenate([r.status for r in found]),
@@ -212,9 +213,18 @@ def _dataset(
         },
         provenance(study) | {"plan": plan.model_dump_json(exclude_none=True), "engine": "sweep"},
     )
-    for name in ("mean", "std", "nominal_mean", "nominal_std"):
-        data[name].attrs["units"] = by_response
+    for name in ("mean", "std"):
+        data[name].attrs |= {RULE: "response", "long_name": f"{QUANTITIES[name]} of a member"}
+        data[f"nominal_{name}"].attrs |= {RULE: "response", "long_name": f"{QUANTITIES[name]}, nothing varied"}
     return data
+
+
+def stored_layout(data: xr.Dataset) -> xr.Dataset:
+    """Return the data of a parameter study as study.nc holds them: one unit a variable (docs/results.md)."""
+    nominal = data["quantity_nominal"].reset_coords(drop=True).assign_attrs({RULE: "quantity", "long_name": "nominal"})
+    data = data.drop_vars("quantity_nominal").assign(nominal_value=nominal)
+    units = {"response": data["unit"].values.tolist(), "quantity": data["quantity_unit"].values.tolist()}
+    return with_conventions(one_unit_a_variable(data, units))
 
 
 def _std(study: Study, sources: list[str], variance: NDArray[np.float64]) -> NDArray[np.float64]:

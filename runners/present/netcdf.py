@@ -19,7 +19,7 @@ FACTOR = re.compile(r"(?P<name>[^\W\d]+|%|°)(\^?(?P<power>-?\d+(\.\d+)?))?")
 
 
 def unit_factors(text: str) -> dict[str, float]:
-    """Return the powers of a unit's factors: 'm/s2' as {'m': 1, 's': -2}; a text that is no such product is one factor."""
+    """Return the powers of a unit's factors, 'm/s2' as {'m': 1, 's': -2}; what is no such product is one factor."""
     found: dict[str, float] = {}
     sign = 1
     for token in re.findall(r"/|[^\s/*·]+", text):
@@ -64,8 +64,8 @@ def one_unit_a_variable(dataset: xr.Dataset, units: Mapping[str, Sequence[str]])
     """Return a dataset in which every entry along some dimensions is a variable with its own unit.
 
     ``std`` (time, response, source) becomes ``bending_moment_std`` (time, source), ``angle_of_attack_std`` and so on.
-    The attributes ``quantity``, ``dimensions`` and, for each dimension that went, its label and ``..._unit`` say where
-    a variable comes from; :func:`joined` puts it back. Of a matrix over two such dimensions, which is symmetric, one
+    The attributes ``quantity``, ``whole_dimensions`` and, for each dimension that went, its label and ``..._unit`` say
+    where a variable comes from; :func:`joined` puts it back. Of a covariance between responses, which is symmetric, one
     triangle is written.
 
     Parameters
@@ -90,7 +90,7 @@ def one_unit_a_variable(dataset: xr.Dataset, units: Mapping[str, Sequence[str]])
             own = {str(d): units[str(d)][i] for d, i in index.items()}
             part = values.variable.isel(index)
             part.attrs = dict(values.attrs) | labels | {f"{d}_unit": unit for d, unit in own.items()}
-            part.attrs |= {"quantity": str(quantity), "dimensions": " ".join(map(str, values.dims))}
+            part.attrs |= {"quantity": str(quantity), "whole_dimensions": " ".join(map(str, values.dims))}
             if RULE in values.attrs:
                 part.attrs["units"] = unit_by_rule(values.attrs[RULE], own)
             meaning = values.attrs.get("long_name", str(quantity))
@@ -112,13 +112,13 @@ def joined(dataset: xr.Dataset) -> xr.Dataset:
     groups: dict[str, list[xr.Variable]] = {}
     whole: dict[Any, Any] = {}
     for name, values in dataset.data_vars.items():
-        if "quantity" in values.attrs and "dimensions" in values.attrs:
+        if "quantity" in values.attrs and "whole_dimensions" in values.attrs:
             groups.setdefault(values.attrs["quantity"], []).append(values.variable)
         else:
             whole[name] = values.variable
     labels: dict[str, list[str]] = {}
     for quantity, parts in groups.items():
-        dims = parts[0].attrs["dimensions"].split()
+        dims = parts[0].attrs["whole_dimensions"].split()
         split = [d for d in dims if d in parts[0].attrs and d not in parts[0].dims]
         for d in split:
             labels.setdefault(d, list(dict.fromkeys(p.attrs[d] for p in parts)))
@@ -130,7 +130,7 @@ def joined(dataset: xr.Dataset) -> xr.Dataset:
                 values[place], filled[place] = part.values, True
         if not filled.all():
             raise ValueError(f"a part of '{quantity}' is missing")
-        dropped = {"quantity", "dimensions", *split, *(f"{d}_unit" for d in split)}
+        dropped = {"quantity", "whole_dimensions", *split, *(f"{d}_unit" for d in split)}
         attributes = {k: v for k, v in parts[0].attrs.items() if k not in dropped}
         if RULE in attributes:
             attributes.pop("units", None)

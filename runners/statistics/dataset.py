@@ -10,7 +10,7 @@ import xarray as xr
 
 from ...model.system.linear_system import COMBINED
 from ..case.provenance import provenance
-from ..present.netcdf import RULE, written_unit, unit_factors
+from ..present.netcdf import RULE, unit_factors, written_unit
 from ..solvers.adjoint import AdjointRun
 from ..solvers.integration import COUNTERS, IntegratorOptions
 
@@ -94,7 +94,9 @@ def with_members(dataset: xr.Dataset, case: Case, parameter_sets: Sequence[Mappi
     whose name the dataset has already is ``parameter_NAME``.
     """
     names = dict.fromkeys(name for changes in parameter_sets for name in changes)
-    coordinates: dict[str, tuple] = {"member": ("member", np.arange(len(parameter_sets)), {"long_name": "set of values"})}
+    coordinates: dict[str, tuple] = {
+        "member": ("member", np.arange(len(parameter_sets)), {"long_name": "set of values"})
+    }
     for name in names:
         parameter = case.parameters[name]
         values = [float(changes.get(name, parameter.value)) for changes in parameter_sets]

@@ -21,8 +21,8 @@ from ..solvers.ensemble import EnsembleOptions
 from ..solvers.integration import IntegratorOptions
 from ..solvers.sweep import LEAST_TOLERANCE, SweepOptions, SweepResult, available_sweep, sweep
 from ..solvers.time_nodes import time_nodes
-from .ensemble import ensemble_dataset
 from .dataset import response_dataset, statistics_dataset
+from .ensemble import ensemble_dataset
 from .results import ResponseStatistics
 
 if TYPE_CHECKING:

@@ -12,9 +12,7 @@ from ..solvers.ensemble import EnsembleOptions, mean_interval, run_ensemble, std
 from .dataset import statistics_dataset
 
 
-def ensemble_dataset(
-    case: Case, times: list[float], responses: list[str], options: EnsembleOptions
-) -> xr.Dataset:
+def ensemble_dataset(case: Case, times: list[float], responses: list[str], options: EnsembleOptions) -> xr.Dataset:
     """Return the statistics of an ensemble as a dataset.
 
     Besides the variables of every engine: ``mean_low``, ``mean_high``, ``std_low``, ``std_high``, the confidence

@@ -158,13 +158,22 @@ def with_peak_check(statistics: ResponseStatistics, check: PeakCheck, case: Case
     """
     by_response = {
         "peak_time": ([p.time for p in check.peaks], {"units": "s", "long_name": "time of the peak"}),
-        "peak": ([p.value for p in check.peaks], {RULE: "response", "long_name": "largest |mean| + 3 sigma over the end times"}),
+        "peak": (
+            [p.value for p in check.peaks],
+            {RULE: "response", "long_name": "largest |mean| + 3 sigma over the end times"},
+        ),
         "peak_side": (
             np.array([sign(p.mean) for p in check.peaks], np.int8),
             {"units": "1", "long_name": "1: mean + 3 sigma is the larger side at the peak, -1: mean - 3 sigma"},
         ),
-        "peak_reference_mean": (check.mean, {RULE: "response", "long_name": f"mean at the peak by {ROADS[check.reference]}"}),
-        "peak_reference_std": (check.std, {RULE: "response", "long_name": f"standard deviation there by {ROADS[check.reference]}"}),
+        "peak_reference_mean": (
+            check.mean,
+            {RULE: "response", "long_name": f"mean at the peak by {ROADS[check.reference]}"},
+        ),
+        "peak_reference_std": (
+            check.std,
+            {RULE: "response", "long_name": f"standard deviation there by {ROADS[check.reference]}"},
+        ),
         "peak_std_difference": (check.std_difference, {"units": "1", "long_name": "of the standard deviations"}),
         "peak_difference": (check.peak_difference, {"units": "1", "long_name": "of |mean| + 3 sigma"}),
     }

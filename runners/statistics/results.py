@@ -31,8 +31,8 @@ class ResponseStatistics:
     Attributes
     ----------
     dataset : xarray.Dataset
-        All arrays, with ``response``, ``source`` and ``time`` (s) as coordinates and ``unit`` over ``response``; a batch
-        has ``member`` in front, with its parameter values. The attributes are what it was computed from.
+        All arrays, with ``response``, ``source`` and ``time`` (s) as coordinates and ``unit`` over ``response``; a
+        batch has ``member`` in front, with its parameter values. The attributes are what it was computed from.
 
     Examples
     --------
@@ -68,7 +68,7 @@ class ResponseStatistics:
         return self.dataset.attrs
 
     def by_response(self) -> xr.Dataset:
-        """Return the dataset that files hold: ``bending_moment_std`` (time, source) and so on, each with CF ``units``."""
+        """Return what files hold: ``bending_moment_std`` (time, source) and so on, each with its CF ``units``."""
         return by_response(self.dataset)
 
     def __getitem__(self, name: str) -> xr.DataArray:
@@ -144,7 +144,9 @@ class ResponseStatistics:
         from .figures import response_figure
 
         table = ResponseStatistics(self._one_table()).sel(response=[response])
-        return response_figure(table.dataset, response, title or str(self.attrs.get("title", self.attrs.get("system", ""))))
+        return response_figure(
+            table.dataset, response, title or str(self.attrs.get("title", self.attrs.get("system", "")))
+        )
 
     def to_frame(self) -> pd.DataFrame:
         """Return a tidy table: a row a member, time (s), response and source, in SI, with the unit of the response."""

@@ -11,7 +11,6 @@ from ..present.netcdf import RULE
 from ..solvers.adjoint import AdjointHistory
 from ..solvers.sweep import SweepResult
 
-
 NOISE_RULE = "response s^-0.5"  # of white noise, whose spectrum is 1 per hertz on both sides
 
 

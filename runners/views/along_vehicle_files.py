@@ -20,6 +20,7 @@ from ...model.errors import TimeRangeError
 from ...model.system.linear_system import COMBINED
 from ...model.vehicle.vehicle import Vehicle
 from ..present.files import write_whole
+from ..present.netcdf import write_netcdf
 from ..present.style import COLORS, STYLE, display, words, write_figure
 from ..statistics.larger_side import LABEL, larger_side
 from .moments_along_vehicle import moments_along_vehicle
@@ -70,7 +71,7 @@ def write_along_vehicle(study: Study, times: list[float], time: float | None, fo
         time = float(found["time"].values[int(np.argmax(largest.values))])
     text = along_csv(found)
     return [
-        write_whole(folder / f"{NAME}.nc", lambda p: found.to_netcdf(p, engine="scipy")),
+        write_netcdf(found, folder / f"{NAME}.nc"),
         write_whole(folder / f"{NAME}.csv", lambda p: p.write_text(text, encoding="utf-8")),
         *write_figure(along_figure(found, time, study.vehicle), folder, NAME),
     ]

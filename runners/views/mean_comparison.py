@@ -46,9 +46,18 @@ def mean_comparison(study: Case) -> xr.Dataset:
     columns = [group.names.index(f"mean.{name}") for name in RESPONSES]
     whole = group.evaluate(planar.times)[:, columns]
     return xr.Dataset(
-        {"mean": (("model", "time", "response"), np.stack([whole, planar.linear, planar.nonlinear]))},
-        coords={"model": list(MODELS), "time": planar.times, "response": list(RESPONSES)},
-        attrs={"unit": "rad"},
+        {
+            "mean": (
+                ("model", "time", "response"),
+                np.stack([whole, planar.linear, planar.nonlinear]),
+                {"units": "rad", "long_name": "mean response to the mean wind"},
+            )
+        },
+        {
+            "model": list(MODELS),
+            "time": ("time", planar.times, {"units": "s", "long_name": "flight time"}),
+            "response": list(RESPONSES),
+        },
     )
 
 

@@ -23,6 +23,7 @@ from ...model.vehicle.columns import local_load_columns
 from ...model.vehicle.noise_loads import loading_noises
 from ..case.provenance import provenance
 from ..solvers.time_nodes import interval_before, time_nodes
+from ..statistics.dataset import QUANTITIES
 
 if TYPE_CHECKING:
     from ..study import Study
@@ -94,7 +95,7 @@ def moments_along_vehicle(
         },
     )
     for name in dataset:
-        dataset[name].attrs["units"] = "(N m)^2" if name == "variance" else "N m"
+        dataset[name].attrs |= {"units": "N^2 m^2" if name == "variance" else "N m", "long_name": QUANTITIES[str(name)]}
     return dataset
 
 

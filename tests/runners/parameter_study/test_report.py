@@ -52,7 +52,7 @@ def reported(study, given: dict, folder: Path, columns: int = 80) -> SimpleNames
 
 def upper(stored: xr.Dataset) -> np.ndarray:
     """Return |mean| + 3 sigma of the members, (member, time)."""
-    return (abs(stored["mean"]) + 3 * stored["std"].sel(source="combined")).sel(response="x").values
+    return (abs(stored["x_mean"]) + 3 * stored["x_std"].sel(source="combined")).values
 
 
 def labelled(figure: Figure) -> tuple[str, ...]:
@@ -74,8 +74,8 @@ def dispersed(study, tmp_path_factory):
 
 def test_spread_csv_is_what_numpy_makes_of_the_stored_members(dispersed):
     stored, rows = dispersed.stored, {r["measure"]: r for r in dispersed.tables["spread.csv"]}
-    at = int(np.argmax((stored["nominal_mean"] + 3 * stored["nominal_std"].sel(source="combined")).values[:, 0]))
-    mean, std = stored["mean"].values[:, at, 0], stored["std"].sel(source="combined").values[:, at, 0]
+    at = int(np.argmax((stored["x_nominal_mean"] + 3 * stored["x_nominal_std"].sel(source="combined")).values))
+    mean, std = stored["x_mean"].values[:, at], stored["x_std"].sel(source="combined").values[:, at]
     samples = {"peak": upper(stored).max(axis=1), "abs_mean_plus_3sigma": mean + 3 * std, "mean": mean, "std": std}
     assert rows.keys() == samples.keys()
     for measure, sample in samples.items():
@@ -114,7 +114,7 @@ def test_members_csv_holds_every_member(dispersed):
     assert len(rows) == 300
     peak, times = upper(stored), stored["time"].values
     for m in (0, 7, 299):
-        assert float(rows[m]["gain (1)"]) == pytest.approx(stored["value"].values[m, 0], rel=1e-9)
+        assert float(rows[m]["gain (1)"]) == pytest.approx(stored["gain_value"].values[m], rel=1e-9)
         assert float(rows[m]["peak |mean| + 3 sigma of x (1)"]) == pytest.approx(peak[m].max(), rel=1e-9)
         assert float(rows[m]["at (s), x"]) == times[np.argmax(peak[m])]
         assert (rows[m]["member"], rows[m]["status"], rows[m]["reason"]) == (str(m), "computed", "")

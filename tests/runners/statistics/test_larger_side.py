@@ -29,9 +29,8 @@ from ascentwind.runners.parameter_study.report import report
 from ascentwind.runners.reproduction.calibration import Model
 from ascentwind.runners.reproduction.predictions import responses
 from ascentwind.runners.reproduction.winds import WindComparison, wind_figure
-from ascentwind.runners.statistics.figures import response_figure
 from ascentwind.runners.statistics.larger_side import LARGER_SIDE, larger_side, side
-from ascentwind.runners.statistics.peaks import peaks
+from ascentwind.runners.statistics.results import ResponseStatistics
 from ascentwind.runners.views import along_vehicle_files as along_vehicle_output
 
 NUMBERS = {"a": 0.8, "b": 2.0, "c": 0.3, "g": 0.5}
@@ -68,7 +67,7 @@ def closed_form(t, a, b, c, g):
 def test_the_peak_is_the_larger_side_of_the_closed_form(driven, a, b, c, g, mirrored):
     numbers = {"a": a, "b": -b if mirrored else b, "c": c, "g": g}
     times = np.linspace(0.5, 6.0, 23)
-    (peak,) = peaks(driven.with_parameters(numbers).response_statistics(times))
+    (peak,) = driven.with_parameters(numbers).response_statistics(times).peaks()
     mean, std = closed_form(times, **numbers)
     both = np.maximum(np.abs(mean + 3 * std), np.abs(mean - 3 * std))
     assert peak.value == pytest.approx(both.max(), rel=1e-6)
@@ -95,9 +94,9 @@ def test_a_mean_of_zero_has_an_upper_side():
 
 def of_run(study: Study, folder: Path, ascentwind) -> list[float]:
     ascentwind("run", "--times", "70:80:5", "--out", str(folder))
-    with xr.open_dataset(folder / "statistics.nc", engine="scipy") as found:
-        assert (np.sign(found["peak_side"]) == np.sign(found["peak_reference_mean"])).all()
-        return [*found["peak"].values, *found["peak_time"].values]
+    found = ResponseStatistics.open(folder)
+    assert (np.sign(found["peak_side"]) == np.sign(found["peak_reference_mean"])).all()
+    return [*found["peak"].values, *found["peak_time"].values]
 
 
 def of_run_along_vehicle(study: Study, folder: Path, ascentwind) -> list[float]:
@@ -123,7 +122,7 @@ def of_figure(study: Study, folder: Path, ascentwind) -> list[float]:
     found = study.response_statistics([70.0, 75.0, 80.0])
     notes = []
     for name in found["response"].values:
-        (note,) = response_figure(found, str(name), "title").axes[0].texts
+        (note,) = found.plot(str(name), "title").axes[0].texts
         assert isinstance(note, Annotation)
         said = re.fullmatch(r"\|mean\| \+ 3σ: (\S+) (?:MN m|deg) at (\S+) s", note.get_text())
         assert said
@@ -211,7 +210,7 @@ def test_mirroring_the_mean_wind_changes_no_headline(command, as504, tmp_path, m
 def test_falcon_1_is_told_by_its_larger_side(cache):
     """Its mean is negative where the moment is largest."""
     found = Study.load("falcon1").response_statistics([68.0, 69.0, 70.0, 71.0], responses=["bending_moment"])
-    (peak,) = peaks(found)
+    (peak,) = found.peaks()
     mean, std = (found[name].sel(source="combined").values[:, 0] for name in ("mean", "std"))
     assert peak.side == "mean - 3σ"
     assert peak.value == pytest.approx(-(mean - 3 * std).min(), rel=1e-12)

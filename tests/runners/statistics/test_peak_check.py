@@ -16,9 +16,10 @@ from ascentwind.runners import Study
 from ascentwind.runners.cli.app import main
 from ascentwind.runners.solvers.adjoint import AdjointSolver
 from ascentwind.runners.statistics import peak_check
+from ascentwind.runners.statistics.dataset import statistics_dataset
 from ascentwind.runners.statistics.engines import ENGINES
 from ascentwind.runners.statistics.peak_check import LIMIT, check_peaks, in_words, weighting_at, with_peak_check
-from ascentwind.runners.statistics.results import statistics_dataset
+from ascentwind.runners.statistics.results import ResponseStatistics
 
 TIMES = [1.0, 2.0, 3.0, 4.0]
 A, B, G = 0.8, 2.0, 0.5
@@ -53,6 +54,10 @@ def std_of_z(t):
     return np.sqrt(10 + (0.3 - 10) * np.exp(-t / 10))
 
 
+def statistics_of(*arguments) -> ResponseStatistics:
+    return ResponseStatistics(statistics_dataset(*arguments))
+
+
 @pytest.mark.parametrize("engine", ENGINES)
 def test_the_other_road_gives_the_closed_form_at_each_response_s_own_peak(study, engine):
     found = study.response_statistics(TIMES, engine=engine)
@@ -77,7 +82,9 @@ def test_a_standard_deviation_beyond_the_limit_is_told(study, factor, agree):
     found = study.response_statistics(TIMES)
     variance = found["variance"].values[..., :-1].copy()
     variance[:, 1] *= factor**2
-    wrong = statistics_dataset(study, TIMES, ["x", "z"], found["mean"].values[..., 0], variance, found.attrs)
+    wrong = ResponseStatistics(
+        statistics_dataset(study, TIMES, ["x", "z"], found["mean"].values[..., 0], variance, found.attrs)
+    )
     check = check_peaks(study, wrong)
     assert check.agree == agree
     said = check.verdict()
@@ -94,7 +101,9 @@ def test_a_standard_deviation_beyond_the_limit_is_told(study, factor, agree):
 def test_a_mean_beyond_the_limit_is_told(study):
     found = study.response_statistics(TIMES)
     mean = found["mean"].values[..., 0] * np.array([1.01, 1.0])
-    wrong = statistics_dataset(study, TIMES, ["x", "z"], mean, found["variance"].values[..., :-1], found.attrs)
+    wrong = ResponseStatistics(
+        statistics_dataset(study, TIMES, ["x", "z"], mean, found["variance"].values[..., :-1], found.attrs)
+    )
     check = check_peaks(study, wrong)
     assert not check.agree
     assert check.verdict().startswith("The mean of x at its peak")
@@ -109,7 +118,9 @@ def test_a_few_runs_are_no_error(study):
     assert check.agree
     assert 0.05 < check.allowed < 0.3
     variance = 2 * found["variance"].values[..., :-1]
-    wrong = statistics_dataset(study, TIMES, ["x", "z"], found["mean"].values[..., -1], variance, found.attrs)
+    wrong = ResponseStatistics(
+        statistics_dataset(study, TIMES, ["x", "z"], found["mean"].values[..., -1], variance, found.attrs)
+    )
     assert not check_peaks(study, wrong).agree
 
 
@@ -117,19 +128,19 @@ def test_statistics_keep_the_peaks_and_their_weighting_functions(study, tmp_path
     """g^2 integrates to the variance, g u to the mean; the file holds it."""
     statistics = study.response_statistics(TIMES)
     check = check_peaks(study, statistics)
-    with_peak_check(statistics, check, study).to_netcdf(tmp_path / "s.nc", engine="scipy")
-    with xr.open_dataset(tmp_path / "s.nc", engine="scipy") as found:
+    with_peak_check(statistics, check, study).save(tmp_path)
+    with xr.open_dataset(tmp_path / "statistics.nc", engine="scipy") as found:
         assert found.attrs["peak_reference"] == "cvodes"
-        assert found["peak_side"].values.tolist() == [-1, 1]
-        assert (found["peak_std_difference"].values < 1e-6).all()
-        np.testing.assert_allclose(found["peak_reference_std"], check.std)
-        own = found.sel(response="x").dropna("point", subset=["peak_weighting_time"])
-        t = own["peak_weighting_time"].values
+        assert [found[f"{name}_peak_side"].item() for name in "xz"] == [-1, 1]
+        assert all(found[f"{name}_peak_std_difference"] < 1e-6 for name in "xz")
+        np.testing.assert_allclose([found[f"{name}_peak_reference_std"] for name in "xz"], check.std)
+        own = found.dropna("point", subset=["x_peak_weighting_time"])
+        t = own["x_peak_weighting_time"].values
         assert t[-1] == check.peaks[0].time
-        g = own["peak_noise_weighting"].sel(noise="n").values
+        g = own["x_peak_noise_weighting"].sel(noise="n").values
         assert np.trapezoid(g**2, t) == pytest.approx(check.std[0] ** 2, rel=1e-3)
         np.testing.assert_allclose(g, G * np.exp(-A * (t[-1] - t)), rtol=1e-5)
-        known = own["peak_input_weighting"].sel(input="u").values
+        known = own["x_peak_input_weighting"].sel(input="u").values
         assert np.trapezoid(known * B * np.sin(t), t) == pytest.approx(check.mean[0], rel=1e-3)
     again, kept = study.weighting_function(check.peaks[0].time), weighting_at(study, check, check.peaks[0].time)
     xr.testing.assert_allclose(again, kept, rtol=1e-10)
@@ -170,16 +181,14 @@ def test_a_run_says_that_cvodes_agrees(ascentwind, tmp_path):
     assert code == 0
     (line,) = [text for text in out.splitlines() if text.startswith("Peaks computed again")]
     assert re.search(r"with CVODES by one adjoint run back from each: they agree to \d parts? in \d* ?[a-z]*", line)
-    with xr.open_dataset(tmp_path / "found" / "statistics.nc", engine="scipy") as found:
-        assert (found["peak_difference"] < 1e-5).all()
+    assert (ResponseStatistics.open(tmp_path / "found")["peak_difference"] < 1e-5).all()
 
 
 def test_a_run_by_cvodes_is_held_against_the_covariance_equation(ascentwind, tmp_path):
     code, out, _ = ascentwind(*RUN, "--engine", "cvodes")
     assert code == 0
     assert "Peaks computed again with the covariance equation: they agree to" in out
-    with xr.open_dataset(tmp_path / "found" / "statistics.nc", engine="scipy") as found:
-        assert found.attrs["peak_reference"] == "covariance"
+    assert ResponseStatistics.open(tmp_path / "found").attrs["peak_reference"] == "covariance"
 
 
 def test_a_run_that_disagrees_ends_with_code_1_and_keeps_its_files(ascentwind, tmp_path, monkeypatch):
@@ -196,8 +205,7 @@ def test_a_run_that_disagrees_ends_with_code_1_and_keeps_its_files(ascentwind, t
     assert re.search(r"The standard deviation of [a-z ]+ at its peak, 4\d s, is .* by CVODES on the same system", out)
     names = {p.name for p in (tmp_path / "found").iterdir()}
     assert {"statistics.nc", "statistics.csv", "bending_moment.png", "weighting_functions.png"} <= names
-    with xr.open_dataset(tmp_path / "found" / "statistics.nc", engine="scipy") as found:
-        assert (found["peak_std_difference"] > LIMIT).all()
+    assert (ResponseStatistics.open(tmp_path / "found")["peak_std_difference"] > LIMIT).all()
 
 
 def test_a_run_whose_check_fails_keeps_its_files(ascentwind, tmp_path, monkeypatch):

@@ -8,8 +8,8 @@ import pytest
 
 from ascentwind.model import define_system
 from ascentwind.runners import Study
-from ascentwind.runners.statistics.tolerance_figure import tolerance_figure
 from ascentwind.runners.statistics.tolerance import measure, pacing, variants
+from ascentwind.runners.statistics.tolerance_figure import tolerance_figure
 
 
 def system(fast: float):
