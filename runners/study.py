@@ -35,12 +35,23 @@ class Study(Case):
 
     Make one with :meth:`load` (vehicles) or :meth:`from_system` (systems of your own).
 
+    Attributes
+    ----------
+    executable : ExecutableSystem
+    vehicle : Vehicle or None
+        None for a system of one's own.
+
     Examples
     --------
-    >>> from ascentwind.runners import Study
-    >>> study = Study.load("as504")
+    >>> import ascentwind as aw
+    >>> study = aw.Study.load("as504")
     >>> stats = study.response_statistics(times=[75.0])
     >>> sigma = stats.std.sel(response="bending_moment", source="wind", time=75.0)
+    >>> print(f"{float(sigma) / 1e6:.2f} MN m")
+    4.62 MN m
+    >>> A, B, C, D = study.matrices(75.0)
+    >>> A.shape == (len(study.system.states),) * 2
+    True
     """
 
     def response_statistics(
@@ -168,11 +179,16 @@ class Study(Case):
             End times t2, s.
         spacing : float
             Largest distance between points, s.
+        options : SweepOptions, optional
 
         Returns
         -------
         xarray.Dataset
             As :meth:`weighting_function`, with a dimension ``time`` in front; zero for t after the end time.
+
+        Raises
+        ------
+        TimeRangeError, IntegrationError, NoCompilerError
         """
         ends = end_times(times)
         self.checked_times(ends)
@@ -199,6 +215,7 @@ class Study(Case):
             t2, s.
         spacing : float
             Largest distance between points, s.
+        options : IntegratorOptions, optional
 
         Returns
         -------
@@ -206,6 +223,10 @@ class Study(Case):
             ``noise_weighting`` (response, noise, t): response to a unit impulse of each white noise at t; squared
             and integrated it gives the variance. ``input_weighting`` (response, input, t): response to an impulse of
             the wind straight into the vehicle; its delta at t = t2 has the weight ``direct`` (response, input).
+
+        Raises
+        ------
+        TimeRangeError, IntegrationError
         """
         self.checked_times([time])
         self.check_spacing(spacing)
@@ -350,6 +371,10 @@ class Study(Case):
         xarray.Dataset
             Over (item): ``derivative``, ``difference``, its ``uncertainty``, how far they are ``apart`` and whether
             the sensitivity ``agrees`` to 1e-5 and the uncertainty.
+
+        Raises
+        ------
+        UnknownNameError, StructuralParameterError, TimeRangeError, DirectNoiseError, ZeroQuantityError
         """
         self.require_linear_mean("a sensitivity")
         return check_sensitivity(self, response, time, source, quantity, parameters, rows)

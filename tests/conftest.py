@@ -1,26 +1,62 @@
-"""Fixtures: a private cache for compiled code, the shipped vehicle, and a copy of it to spoil."""
+"""Fixtures: what is compiled and fitted once for all workers, the shipped vehicles, and a copy of one to spoil."""
 
 from __future__ import annotations
 
+import hashlib
 import os
+import pickle
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from filelock import FileLock
 
 from ascentwind.model.vehicle.shipped import built_in_vehicles
+from ascentwind.model.wind.statistics import WindStatistics
 from ascentwind.runners import Study
+from ascentwind.runners.wind.synthesis.result import SynthesisResult
+from ascentwind.runners.wind.synthesis.synthesise import synthesise
+
+
+def pytest_xdist_auto_num_workers(config) -> int | None:
+    """A few files asked for by name are run in this process: it starts at once and a debugger works in it."""
+    return 0 if len(config.args) < 4 and all(Path(a.partition("::")[0]).is_file() for a in config.args) else None
+
+
+@pytest.fixture(scope="session")
+def shared_folder(tmp_path_factory) -> Path:
+    """A folder that all workers of this run share."""
+    base = tmp_path_factory.getbasetemp()  # a worker's own lies in that of the run
+    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "shared"
+    folder.mkdir(exist_ok=True)
+    return folder
 
 
 @pytest.fixture(scope="session", autouse=True)
-def cache(tmp_path_factory):
+def cache(shared_folder):
     with pytest.MonkeyPatch.context() as patch:
         kept = os.environ.get("ASCENTWIND_TEST_CACHE")  # keys hold the source: a library of old code is never found
-        folder = Path(kept) if kept else tmp_path_factory.mktemp("cache")
+        folder = Path(kept) if kept else shared_folder / "cache"
         folder.mkdir(exist_ok=True)
         folder.chmod(0o700)
         patch.setenv("ASCENTWIND_CACHE", str(folder))
         yield folder
+
+
+@pytest.fixture(scope="session")
+def fit(shared_folder) -> Callable[..., SynthesisResult]:
+    """``synthesise``, but the same statistics by the same method are fitted once in a run, whichever worker asks."""
+
+    def fitted(statistics: WindStatistics, method: str = "state-space", **settings) -> SynthesisResult:
+        asked = hashlib.sha256(pickle.dumps((statistics, method, sorted(settings.items())))).hexdigest()
+        file = shared_folder / f"{asked[:32]}.fit"
+        with FileLock(file.with_suffix(".lock")):
+            if not file.exists():
+                file.write_bytes(pickle.dumps(synthesise(statistics, method, **settings)))
+            return pickle.loads(file.read_bytes())
+
+    return fitted
 
 
 @pytest.fixture(scope="session")

@@ -208,13 +208,39 @@ class LinearSystem:
         return tuple(dict.fromkeys(n.source for n in self.noises))
 
     def noise_columns(self, source: str) -> list[int]:
-        """Return the columns of B and D that belong to a source."""
+        """Return the columns of B and D that belong to a source.
+
+        Parameters
+        ----------
+        source : str
+
+        Returns
+        -------
+        list of int
+
+        Raises
+        ------
+        UnknownNameError
+        """
         if source not in self.sources:
             raise UnknownNameError("noise source", source, self.sources)
         return [i for i, n in enumerate(self.noises) if n.source == source]
 
     def output_index(self, name: str) -> int:
-        """Return the row of a response in C and D."""
+        """Return the row of a response in C and D.
+
+        Parameters
+        ----------
+        name : str
+
+        Returns
+        -------
+        int
+
+        Raises
+        ------
+        UnknownNameError
+        """
         if name not in self.output_names:
             raise UnknownNameError("response", name, self.output_names)
         return self.output_names.index(name)
@@ -222,10 +248,16 @@ class LinearSystem:
     def refuse_direct_noise(self, outputs: Iterable[str]) -> None:
         """Raise if white noise reaches one of the outputs directly.
 
+        Parameters
+        ----------
+        outputs : iterable of str
+            Names of responses.
+
         Raises
         ------
         DirectNoiseError
             Names source, output and the way out.
+        UnknownNameError
         """
         rows, columns = self.D.sparsity().row(), self.D.sparsity().get_col()
         for name in outputs:
@@ -252,6 +284,11 @@ class LinearSystem:
         parameters : (n_p,) array
         until : float
             s; those beyond it may be among them.
+
+        Returns
+        -------
+        Stops
+            Times (s) and the switches that lie there.
 
         Raises
         ------
@@ -294,11 +331,29 @@ class LinearSystem:
         return ca.jacobian(self.output, self.u)
 
     def adjoint_derivative(self, adjoint: ca.SX) -> ca.SX:
-        """Return -A^T times the columns of ``adjoint``, derived as CasADi's transposed Jacobian product."""
+        """Return -A^T times the columns of ``adjoint``, derived as CasADi's transposed Jacobian product.
+
+        Parameters
+        ----------
+        adjoint : (n, k) SX
+
+        Returns
+        -------
+        (n, k) SX
+        """
         return -ca.jtimes(self.derivative, self.x, adjoint, True)
 
     def start_covariance_matrix(self, source: str, values: np.ndarray) -> np.ndarray:
-        """Return P0 of a source for the parameter values ``values``, shape (n, n).
+        """Return P0 of a source for given parameter values.
+
+        Parameters
+        ----------
+        source : str
+        values : (n_p,) array
+
+        Returns
+        -------
+        (n, n) array
 
         Raises
         ------

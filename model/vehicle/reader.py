@@ -58,6 +58,10 @@ def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehi
     changes : mapping, optional
         Values to put in the place of the file's, by dotted key; see ``read_vehicle_file``.
 
+    Returns
+    -------
+    Vehicle
+
     Raises
     ------
     DataError

@@ -74,6 +74,10 @@ class Case:
             Values in the place of those in vehicle.toml, by dotted key: ``{"options.full_coupling": True}``. They may
             change the structure, which ``with_parameters`` cannot.
 
+        Returns
+        -------
+        Study
+
         Raises
         ------
         UnknownNameError, DataError, SingularCouplingError, CompilerError
@@ -82,7 +86,23 @@ class Case:
 
     @classmethod
     def from_vehicle(cls, vehicle: Vehicle, *, compile: bool = True) -> Self:
-        """Assemble a loaded vehicle and prepare its code."""
+        """Assemble a loaded vehicle and prepare its code.
+
+        Parameters
+        ----------
+        vehicle : Vehicle
+            As :func:`ascentwind.load_vehicle` returns it.
+        compile : bool
+            As for :meth:`load`.
+
+        Returns
+        -------
+        Study
+
+        Raises
+        ------
+        SingularCouplingError, CompilerError
+        """
         altitude = float(vehicle.tables["altitude"].polynomial(vehicle.start))
         system = assemble(vehicle, covariance_at(vehicle.wind.shaping_filter, altitude))
         executable = executable_system(system, compile)
@@ -91,7 +111,23 @@ class Case:
 
     @classmethod
     def from_system(cls, system: LinearSystem, *, compile: bool = True) -> Self:
-        """Prepare the code of a linear system of your own."""
+        """Prepare the code of a linear system of your own.
+
+        Parameters
+        ----------
+        system : LinearSystem
+            As :func:`ascentwind.define_system` returns it.
+        compile : bool
+            As for :meth:`load`.
+
+        Returns
+        -------
+        Study
+
+        Raises
+        ------
+        CompilerError
+        """
         return cls(executable_system(system, compile))
 
     @property
@@ -108,6 +144,15 @@ class Case:
     def with_parameters(self, changes: Mapping[str, float]) -> Self:
         """Return a study with other parameter values; nothing is compiled.
 
+        Parameters
+        ----------
+        changes : mapping of str to float
+            Values by parameter name, in the units that ``parameters`` shows.
+
+        Returns
+        -------
+        Study
+
         Raises
         ------
         UnknownNameError
@@ -118,6 +163,21 @@ class Case:
         return type(self)(self.executable.with_numbers(parameters=self.numbers(changes)), self.vehicle)
 
     def numbers(self, changes: Mapping[str, float]) -> NDArray[np.float64]:
+        """Return the values of all parameters with some changed, in the order of the system's.
+
+        Parameters
+        ----------
+        changes : mapping of str to float
+            As for :meth:`with_parameters`.
+
+        Returns
+        -------
+        (n_p,) array
+
+        Raises
+        ------
+        UnknownNameError, ParameterValueError
+        """
         names, values = self.system.parameter_names, self.executable.parameters.copy()
         for name, value in changes.items():
             if name not in names:
@@ -138,6 +198,10 @@ class Case:
         ----------
         wind : WindModel
             Mean and filter of one wind.
+
+        Returns
+        -------
+        Study
 
         Raises
         ------
@@ -179,30 +243,105 @@ class Case:
         return self.linear_means
 
     def matrices(self, time: float) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-        """Return A (n, n), B (n, n_w), C (n_y, n), D (n_y, n_w) at a time; names are in ``case.system``."""
+        """Return the matrices at a time; names of their rows and columns are in ``system``.
+
+        Parameters
+        ----------
+        time : float
+            s.
+
+        Returns
+        -------
+        A (n, n), B (n, n_w), C (n_y, n), D (n_y, n_w) : arrays
+
+        Raises
+        ------
+        TimeRangeError
+        """
         self.checked_times([time])
         m = matrices_at(self.with_means, float(time))
         return m["A"], m["B"], m["C"], m["D"]
 
     def roots(self, time: float) -> list[Root]:
-        """Return the eigenvalues of A frozen at a time, slowest first."""
+        """Return the eigenvalues of A frozen at a time, slowest first.
+
+        Parameters
+        ----------
+        time : float
+            s.
+
+        Returns
+        -------
+        list of Root
+
+        Raises
+        ------
+        TimeRangeError
+        """
         self.checked_times([time])
         return roots(self.executable, float(time))
 
     def tables(self, time: float) -> dict[str, float]:
-        """Return every table value at a time (s) by name."""
+        """Return every table value at a time by name.
+
+        Parameters
+        ----------
+        time : float
+            s.
+
+        Returns
+        -------
+        dict of str to float
+
+        Raises
+        ------
+        TimeRangeError
+        """
         self.checked_times([time])
         return table_values(self.with_means.groups, float(time))
 
     def require_linear_mean(self, what: str) -> None:
+        """Raise where the nonlinear mean is in force and something follows the linear one.
+
+        Parameters
+        ----------
+        what : str
+            Begins the sentence of the error.
+
+        Raises
+        ------
+        ParameterValueError
+        """
         if self.vehicle is not None and self.vehicle.file.options.mean_response == "nonlinear":
             raise ParameterValueError(f'{what} follows the linear mean response; set options.mean_response = "linear"')
 
     def check_spacing(self, spacing: float) -> None:
+        """Raise if a distance between points is not positive.
+
+        Parameters
+        ----------
+        spacing : float
+            s.
+
+        Raises
+        ------
+        TimeRangeError
+        """
         if not spacing > 0:
             raise TimeRangeError(f"a spacing of {spacing:g} s is not positive")
 
     def checked_times(self, times: list[float]) -> None:
+        """Raise if one of the end times does not lie on the flight, or there are none.
+
+        Parameters
+        ----------
+        times : list of float
+            s.
+
+        Raises
+        ------
+        TimeRangeError
+        """
         if not times:
             raise TimeRangeError("no end time was given")
         for time in times:
@@ -225,6 +364,20 @@ class Case:
         return f"the last row of {shortest.file.name} at {shortest.last:g} s; extend the table or ask for less"
 
     def checked_responses(self, responses: Iterable[str] | None) -> list[str]:
+        """Return the names of responses, each once; all for None.
+
+        Parameters
+        ----------
+        responses : iterable of str or None
+
+        Returns
+        -------
+        list of str
+
+        Raises
+        ------
+        UnknownNameError, DirectNoiseError
+        """
         if isinstance(responses, str):
             responses = [responses]
         names = list(self.system.output_names if responses is None else dict.fromkeys(responses))

@@ -132,6 +132,10 @@ def design(
     progress : callable, optional
         Called with the height of the peak (SI) after each iteration.
 
+    Returns
+    -------
+    DesignResult
+
     Raises
     ------
     InfeasibleDesignError

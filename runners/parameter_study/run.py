@@ -86,6 +86,10 @@ def run_parameter_study(
     progress : callable, optional
         Called with the number of members done and of all.
 
+    Returns
+    -------
+    ParameterStudy
+
     Raises
     ------
     DataError, TimeRangeError, UnknownNameError

@@ -66,6 +66,10 @@ def synthesise(
     settings
         ``noises`` of 'state-space', ``search`` of 'constrained-response'.
 
+    Returns
+    -------
+    SynthesisResult
+
     Raises
     ------
     UnknownNameError

@@ -64,15 +64,15 @@ PLANTED = "__attribute__((constructor)) static void planted(void) { *(volatile i
     ],
 )
 @pytest.mark.skipif(find_compiler() is None, reason="compiles")
-def test_text_of_a_user_stays_in_its_comment(text, cache):
+def test_text_of_a_user_stays_in_its_comment(text, tmp_path, monkeypatch):
     """Names, units and the system's name hold C; the libraries compile, load, and answer as the plain system does."""
-    kept = set(cache.parent.rglob("*.so"))
+    cache = tmp_path / "inside" / "cache"
+    monkeypatch.setenv("ASCENTWIND_CACHE", str(cache))
     system = lag(tuple(f"{k} {text}" for k in "snop"), name=f"n {text}", units={f"s {text}": f"u {text}"})
     statistics = Study.from_system(system).response_statistics([1.0])
     assert statistics.attrs["engine"] == "sweep"
     assert statistics.variance.values[0, 0, 0] == pytest.approx(variance(1.0), rel=1e-5)
-    new = set(cache.parent.rglob("*.so")) - kept
-    assert all(path.parent == cache for path in new)
+    assert {path.parent for path in tmp_path.rglob("*.so")} == {cache}
     sources = (c_source(system, core_functions(system)), sweep_source(system, sweep_functions(system)))
     for source in sources:
         assert "(constructor)" not in _without_comments(source)

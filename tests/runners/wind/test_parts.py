@@ -33,9 +33,9 @@ from ascentwind.runners.wind.verification import simulate_profiles, standard_dev
 
 
 @pytest.fixture(scope="module")
-def march():
+def march(fit):
     statistics = shipped_statistics()
-    return synthesise(statistics).shaping_filter, statistics
+    return fit(statistics).shaping_filter, statistics
 
 
 def spectrum(shaping_filter, altitude: float, wave_number: float) -> float:
@@ -97,9 +97,9 @@ def test_bad_turbulence(arguments, error, says):
         turbulence_filter(**arguments)
 
 
-def test_two_components_have_the_intralevel_correlation():
+def test_two_components_have_the_intralevel_correlation(fit):
     both = shipped_two_components()
-    zonal, meridional = (synthesise(s).shaping_filter for s in (both.zonal, both.meridional))
+    zonal, meridional = (fit(s).shaping_filter for s in (both.zonal, both.meridional))
     deviations = (both.zonal.standard_deviation, both.meridional.standard_deviation)
     h = both.zonal.altitude
     r, start = fit_noise_correlation(zonal, meridional, h, both.intralevel_correlation, deviations)
@@ -239,10 +239,10 @@ def test_a_flight_above_the_filter_is_told(as504, march):
         as504.with_wind(replace(as504.vehicle.wind, shaping_filter=shaping_filter))
 
 
-def test_a_filter_is_held_where_the_mean_wind_goes_on(as504, march):
+def test_a_filter_is_held_where_the_mean_wind_goes_on(as504, march, fit):
     """The mean covers 3 m to 30 km, the filters less at both ends: their coefficients are the end values there."""
     shaping_filter, statistics = march
-    middle = synthesise(statistics.between(2000.0, 16000.0), "constrained-response").shaping_filter
+    middle = fit(statistics.between(2000.0, 16000.0), "constrained-response").shaping_filter
     for f, times in ((shaping_filter, (100.0, 110.0)), (middle, (12.0, 25.0, 100.0))):
         with pytest.warns(ExtrapolationWarning):
             study = as504.with_wind(replace(as504.vehicle.wind, shaping_filter=f))

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from ascentwind.model.errors import DataError, UnknownNameError
-from ascentwind.model.wind.range_reference import shipped_statistics
+from ascentwind.model.wind.range_reference import MONTHS, shipped_statistics
+from ascentwind.model.wind.record import COMPONENTS
 from ascentwind.model.wind.shaping_filter import ShapingFilter
 from ascentwind.model.wind.statistics import WindStatistics, closed_form_filter
 from ascentwind.runners.solvers.least_squares import FitError, FitOptions, StalledFitWarning
@@ -31,9 +32,9 @@ REACHED = {"state-space": (0.0, 0.2), "constrained-response": (1000.0, 0.3), "im
 
 
 @pytest.fixture(scope="module", params=REACHED)
-def fitted(request):
+def fitted(request, fit):
     low, limit = REACHED[request.param]
-    return synthesise(shipped_statistics().between(low, 16000.0), request.param), limit
+    return fit(shipped_statistics().between(low, 16000.0), request.param), limit
 
 
 def test_march_is_met(fitted):
@@ -88,16 +89,16 @@ def test_compiled_and_interpreted_engine_agree():
     assert one == pytest.approx(other, rel=1e-8)
 
 
-def test_two_noises_fit_at_least_as_well():
+def test_two_noises_fit_at_least_as_well(fit):
     s = shipped_statistics()
-    one, two = (synthesise(s, noises=m) for m in (1, 2))
+    one, two = fit(s), synthesise(s, noises=2)
     assert two.rms_error < one.rms_error
     assert verify(two.shaping_filter, s).covariance == pytest.approx(two.covariance, rel=1e-6)
 
 
-def test_response_coefficients_are_those_of_the_filter():
+def test_response_coefficients_are_those_of_the_filter(fit):
     """(3-10) with the coefficients handed back is the filter's response to an impulse."""
-    result = synthesise(shipped_statistics().between(1000.0, 16000.0), "constrained-response")
+    result = fit(shipped_statistics().between(1000.0, 16000.0), "constrained-response")
     c = {name: (h, values) for name, (h, values) in result.coefficients.items()}
     low, low_index, high = result.shaping_filter.altitude[0], 40, 200
 
@@ -224,19 +225,16 @@ def test_unstable_filter_is_seen():
     assert largest_pole(f) == pytest.approx(1e-4)
 
 
-def test_all_months_and_components_converge_from_the_same_start():
-    from ascentwind.model.wind.range_reference import MONTHS
-    from ascentwind.model.wind.record import COMPONENTS
-
-    for period in MONTHS:
-        for component in COMPONENTS:
-            statistics = shipped_statistics(period, component)
-            result = synthesise(statistics)
-            assert result.converged, (period, component)
-            assert result.rms_error <= 1.0, (period, component)
-            assert result.share_inside() == 1.0, (period, component)
-            # strictly, on a grid finer than the samples: no mode lives longer than 1000 km
-            assert largest_pole(result.shaping_filter) < -1e-6, (period, component)
+@pytest.mark.slow
+@pytest.mark.parametrize("component", COMPONENTS)
+@pytest.mark.parametrize("period", MONTHS)
+def test_all_months_and_components_converge_from_the_same_start(fit, period, component):
+    result = fit(shipped_statistics(period, component))
+    assert result.converged
+    assert result.rms_error <= 1.0
+    assert result.share_inside() == 1.0
+    # strictly, on a grid finer than the samples: no mode lives longer than 1000 km
+    assert largest_pole(result.shaping_filter) < -1e-6
 
 
 @pytest.mark.parametrize(("order", "noises"), [(1, 1), (2, 1), (3, 1), (3, 2), (4, 1), (6, 3)])
