@@ -18,7 +18,7 @@ from ascentwind.runners.wind.correlation_fit import QUANTITIES, march_kernel, re
 def write_kernels(file: Path) -> None:
     """Write the knots of all months and components, as shipped in model/wind/data."""
     lines = [
-        "# computed: knots of the two-part kernel by month and component (correlation_fit.py), fitted to level",
+        "# computed: two-part kernel by month and component (runners/wind/correlation_fit.py), knots fitted to level",
         "# correlations of Cape Canaveral soundings 2008-2022; March by hand; assumed below 1.5 km and above 10.7 km;",
         "# 'third_order' is March zonal with smoothness 0.5, all others have 0.7; scales in m",
         "month,component,quantity,altitude [m],value",

@@ -7,6 +7,9 @@ from collections.abc import Iterable, Mapping, Sequence
 import casadi as ca
 
 from ..system.labels import Output
+from .coupling import Accelerations
+from .motion import Motion
+from .typical_sizes import SCALES
 
 
 def component_columns(modes: int, tanks: Sequence[str], noises: Iterable[str] = ()) -> dict[str, str]:
@@ -30,33 +33,25 @@ def component_columns(modes: int, tanks: Sequence[str], noises: Iterable[str] = 
 
 
 def load_components(
-    tanks: Sequence[str],
-    scales: Mapping[str, float],
-    attitude_rate: ca.SX,
-    eta: ca.SX,
-    eta_rate: ca.SX,
-    eta_acceleration: ca.SX,
-    xi: ca.SX,
-    xi_acceleration: ca.SX,
-    deviations: Mapping[str, ca.SX],
+    motion: Motion, solved: Accelerations, tanks: Sequence[str], deviations: Mapping[str, ca.SX]
 ) -> list[tuple[Output, ca.SX]]:
     """Return those of them that are no outputs anyway."""
-    found = [(Output("attitude_rate", "rad/s", scales["angle"], "phi'"), attitude_rate)]
-    for i in range(eta.numel()):
+    found = [(Output("attitude_rate", "rad/s", SCALES["angle"], "phi'"), motion.attitude_rate)]
+    for i in range(motion.eta.numel()):
         n = i + 1
         found += [
-            (Output(f"bending_acceleration_{n}", "m/s2", scales["bending_acceleration"], f"eta_{n}''"),
-             eta_acceleration[i]),
-            (Output(f"bending_displacement_{n}", "m", scales["bending"], f"eta_{n}"), eta[i]),
-            (Output(f"bending_rate_{n}", "m/s", scales["bending_rate"], f"eta_{n}'"), eta_rate[i]),
+            (Output(f"bending_acceleration_{n}", "m/s2", SCALES["bending_acceleration"], f"eta_{n}''"),
+             solved.bending[i]),
+            (Output(f"bending_displacement_{n}", "m", SCALES["bending"], f"eta_{n}"), motion.eta[i]),
+            (Output(f"bending_rate_{n}", "m/s", SCALES["bending_rate"], f"eta_{n}'"), motion.eta_rate[i]),
         ]  # fmt: skip
     for k, tank in enumerate(tanks):
         found += [
-            (Output(f"slosh_acceleration_{tank}", "m/s2", scales["slosh_acceleration"], f"xi'' of {tank}"),
-             xi_acceleration[k]),
-            (Output(f"slosh_displacement_{tank}", "m", scales["slosh"], f"xi of {tank}"), xi[k]),
+            (Output(f"slosh_acceleration_{tank}", "m/s2", SCALES["slosh_acceleration"], f"xi'' of {tank}"),
+             solved.slosh[k]),
+            (Output(f"slosh_displacement_{tank}", "m", SCALES["slosh"], f"xi of {tank}"), motion.xi[k]),
         ]  # fmt: skip
     for name, deviation in deviations.items():
-        output = Output(f"relative_deviation_{name}", "1", scales["relative_deviation"], f"n of {name}")
+        output = Output(f"relative_deviation_{name}", "1", SCALES["relative_deviation"], f"n of {name}")
         found.append((output, deviation))
     return found

@@ -17,11 +17,12 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from ..system.labels import State
 from ..system.symbols import ParameterSymbols, TableSymbols
 from ..vehicle.vehicle_file import SensorFeedbackEntry
+from .block import Block
 from .control import TransferFunction, transfer_function, transfer_function_symbols
 from .coupling import Accelerations
+from .motion import Motion
 
 GAIN_UNITS = {"accelerometer": "rad s2/m", "angle_of_attack": "1"}
 SIGNALS = {"accelerometer": ("m/s2", 1.0), "angle_of_attack": ("rad", 0.02)}  # unit and typical size
@@ -105,6 +106,22 @@ def sensed_angle_of_attack(
     return angle_of_attack + sensor.slope.T @ eta - motion / tables["relative_velocity"]
 
 
-def filter_states(name: str, filtered: TransferFunction) -> list[State]:
-    """Return what the states of a sensor's filter are."""
-    return [State(f"{name}_filter_{i + 1}", *SIGNALS[name]) for i in range(filtered.states.numel())]
+def feedbacks(
+    tables: TableSymbols, sensors: Mapping[str, Sensor], motion: Motion, solved: Accelerations
+) -> dict[str, TransferFunction]:
+    """Return what every sensor adds to the engine command, rad."""
+    signals = {}
+    if "accelerometer" in sensors:
+        signals["accelerometer"] = sensed_acceleration(
+            tables, sensors["accelerometer"], solved, motion.attitude, motion.eta
+        )
+    if "angle_of_attack" in sensors:
+        signals["angle_of_attack"] = sensed_angle_of_attack(
+            tables, sensors["angle_of_attack"], motion.alpha, motion.attitude_rate, motion.eta, motion.eta_rate
+        )
+    return {name: sensors[name].feedback(name, signal) for name, signal in signals.items()}
+
+
+def filter_block(name: str, filtered: TransferFunction) -> Block:
+    """Return the states of a sensor's filter, which have the unit of its signal."""
+    return Block.numbered(f"{name}_filter", filtered.states, filtered.derivative, *SIGNALS[name])

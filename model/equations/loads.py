@@ -7,8 +7,10 @@ from collections.abc import Sequence
 import casadi as ca
 import numpy as np
 
-from ..system.symbols import TableSymbols
+from ..system.symbols import ParameterSymbols, TableSymbols
 from ..tables import Table
+from ..vehicle.vehicle import Vehicle
+from ..vehicle.vehicle_file import LoadEntry
 from .slosh import attach_arms, tank_column
 
 TYPICAL_ANGLE = 0.1  # rad: of the angle of attack in strong wind near the greatest dynamic pressure
@@ -43,22 +45,54 @@ def bending_moment(
     return moment
 
 
+def tanks_forward(vehicle: Vehicle, load: LoadEntry, time: ca.SX, parameters: ParameterSymbols) -> ca.SX:
+    """Return 1 where a tank's slosh mass is forward of a load station and 0 where it is aft, shape (tanks,).
+
+    A condition on a table has no known times; the times (s) at which draining liquid passes the station are found here
+    and become parameters, so that integrators stop there.
+    """
+    assert load.forward_of_gimbal_m is not None  # checked by load_vehicle
+    found = []
+    for tank in vehicle.slosh:
+        table = vehicle.tables[f"slosh.{tank.name}.attach_point"]
+        is_forward, times = passes(table, load.forward_of_gimbal_m, vehicle.start, vehicle.end)
+        forward = ca.SX(is_forward)
+        for k, passed in enumerate(times, start=1):
+            is_forward = 1 - is_forward
+            name = f"loads.{load.output}.{tank.name}_passes_{k}"
+            meaning = f"time at which the slosh mass of {tank.name} passes the station of {load.output}"
+            forward += (2 * is_forward - 1) * (time >= parameters.add(name, passed, "s", meaning))
+        found.append(forward)
+    return ca.vertcat(ca.SX(0, 1), *found)
+
+
+def passes(table: Table, station: float, start: float, end: float) -> tuple[int, list[float]]:
+    """Return whether a table lies above a station (m) at the start, 0 or 1, and the times (s) at which it passes it."""
+    polynomial = table.polynomial
+    roots = polynomial.solve(station, extrapolate=False)
+    times = np.unique(np.concatenate([[start, end], roots[(roots > start) & (roots < end)], polynomial.x]))
+    times = times[(times >= start) & (times <= end)]
+    above = polynomial((times[:-1] + times[1:]) / 2) > station
+    changes = np.flatnonzero(above[1:] != above[:-1]) + 1
+    return int(above[0]), times[changes].tolist()
+
+
 def slosh_reaction(
     tables: TableSymbols,
     output: str,
     tanks: Sequence[str],
-    forward_of_gimbal: float,
+    forward: ca.SX,
     xi: ca.SX,
     xi_acceleration: ca.SX,
 ) -> ca.SX:
     """What 4-13 leaves out of slosh: the weight of displaced liquid, and the answer of the whole vehicle, N m.
 
-    sum_k m_k [S_1 / m + (X_Sk - X_CG) S_2 / I_ZZ] xi_k'' + A_X m_k [1 (X_Sk > s) - S_2 / I_ZZ] xi_k
+    sum_k m_k [S_1 / m + (X_Sk - X_CG) S_2 / I_ZZ] xi_k'' + A_X m_k [1 (X_Sk > s) - S_2 / I_ZZ] xi_k, where ``forward``,
+    shape (tanks,), is 1 (X_Sk > s), 0 or 1.
     """
     coefficients = tables.under(f"loads.{output}.")
     mass = tank_column(tables, tanks, "mass")
     turning = coefficients["second_moment"] / tables["moment_of_inertia"]
     inertia = mass * (coefficients["first_moment"] / tables["mass"] + attach_arms(tables, tanks) * turning)
-    forward = tank_column(tables, tanks, "attach_point") > forward_of_gimbal
     weight = tables["axial_acceleration"] * mass * (forward - turning)
     return ca.dot(inertia, xi_acceleration) + ca.dot(weight, xi)

@@ -18,6 +18,9 @@ import casadi as ca
 
 from ..system.symbols import ParameterSymbols
 from ..vehicle.vehicle_file import NoiseEntry
+from .block import Block
+
+DEVIATION = "deviation"  # the block of their states
 
 
 @dataclass(frozen=True)
@@ -28,6 +31,12 @@ class NoiseProcess:
     derivative: ca.SX
     white: ca.SX
     deviation: ca.SX
+
+
+def deviation_block(name: str, process: NoiseProcess) -> Block:
+    """Return the state of a noise source, where it is coloured."""
+    names = [f"{DEVIATION}_{name}"] * process.state.numel()
+    return Block.of(DEVIATION, process.state, process.derivative, names=names)
 
 
 def noise_process(name: str, entry: NoiseEntry, parameters: ParameterSymbols) -> NoiseProcess:

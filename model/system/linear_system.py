@@ -26,7 +26,7 @@ from .checks import (
     check_symbols,
     checked_covariance,
 )
-from .labels import Noise, Output, Parameter, State
+from .labels import Noise, Output, Parameter, State, block_of
 from .names import COMBINED as COMBINED
 from .switches import switch_times
 from .time_conditions import Condition, Stops, find_conditions, locate
@@ -201,6 +201,15 @@ class LinearSystem:
     @property
     def parameter_names(self) -> tuple[str, ...]:
         return tuple(p.name for p in self.parameters)
+
+    def block(self, name: str) -> slice:
+        """Return where the states of a block stand in x, such as those of the wind filter ('wind').
+
+        Raises
+        ------
+        UnknownNameError
+        """
+        return block_of(self.states, name)
 
     @property
     def sources(self) -> tuple[str, ...]:

@@ -15,9 +15,10 @@ import numpy as np
 import xarray as xr
 
 from ...codegen.system.executable import ExecutableSystem
-from ...model.equations.assemble import vehicle_tables
+from ...model.equations.vehicle_tables import vehicle_tables
 from ...model.errors import ParameterValueError
 from ...model.system.linear_system import COMBINED
+from ...model.system.names import WIND
 from ...model.vehicle.vehicle import Vehicle
 from ...model.wind.shaping_filter import ShapingFilter
 from ..case.wind_start import covariance_at
@@ -132,9 +133,9 @@ def of_vehicle(executable: ExecutableSystem, vehicle: Vehicle) -> ExecutableSyst
     system = executable.system
     altitude = float(vehicle.tables["altitude"].polynomial(vehicle.start))
     covariance = covariance_at(vehicle.wind.shaping_filter, altitude)
-    wind, first = np.zeros((len(system.states),) * 2), system.state_names.index("wind_1")
-    wind[first : first + len(covariance), first : first + len(covariance)] = covariance
-    changed = replace(system, start_covariance={**system.start_covariance, "wind": wind})
+    wind, rows = np.zeros((len(system.states),) * 2), system.block(WIND)
+    wind[rows, rows] = covariance
+    changed = replace(system, start_covariance={**system.start_covariance, WIND: wind})
     return replace(executable, system=changed, groups=vehicle_tables(vehicle))
 
 

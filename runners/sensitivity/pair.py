@@ -19,7 +19,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ...model.equations.assemble import MEAN_TABLES
+from ...model.equations.vehicle_tables import MEAN_TABLES
 from ..solvers.collocation_grid import STAGES, tables_at
 from ..solvers.flight_nodes import FlightNodes
 from ..solvers.start_functions import start_functions

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ...codegen.nodes.expressions import MATRICES
 from ...codegen.nodes.matrix import NodeMatrix
-from ...model.equations.assemble import MEAN_TABLES
+from ...model.equations.vehicle_tables import MEAN_TABLES
 from ...model.errors import ParameterValueError, SwitchError
 from ..case.provenance import provenance
 from ..solvers.collocation_grid import STAGES

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...codegen.nodes.matrix import NodeMatrix
+from ...model.system.names import WIND
 from ...model.vehicle.vehicle import Vehicle
 from ...model.wind.shaping_filter import ShapingFilter, entry_name
 from ..solvers.collocation import Collocation
@@ -44,14 +45,13 @@ class StartShare:
 
 def start_share(vehicle: Vehicle | None, pair: AdjointPair, factor: float) -> StartShare | None:
     """Return what ``factor`` times a variance owes to the wind filter below the start; None without wind."""
-    if vehicle is None or "wind" not in pair.sources:
+    if vehicle is None or WIND not in pair.sources:
         return None
     shaping_filter = vehicle.wind.shaping_filter
     bottom, top = float(shaping_filter.altitude[0]), float(vehicle.tables["altitude"].polynomial(vehicle.start))
     if top <= bottom:
         return None
-    first = pair.executable.system.state_names.index("wind_1")
-    a_top = pair.adjoint_at_start[first : first + shaping_filter.order]
+    a_top = pair.adjoint_at_start[pair.executable.system.block(WIND)]
     fastest = np.abs(shaping_filter.F[shaping_filter.altitude <= top]).sum(axis=2).max()  # 1/m, or more
     grid = _grid(shaping_filter, bottom, top, RATE / max(fastest, RATE / (top - bottom)))
     nodes = grid.nodes.ravel()

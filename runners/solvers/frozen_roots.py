@@ -5,7 +5,7 @@ A simple eigenvalue s of A with left and right vectors l, r (l r = 1) has ds/dp 
 
 from __future__ import annotations
 
-import re
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -14,25 +14,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...codegen.system.executable import ExecutableSystem
+from ...model.equations.noise import DEVIATION
 from ...model.system.linear_system import LinearSystem
+from ...model.system.names import WIND
 from ...model.tables import table_values
 
 RIGID_BODY = "rigid_body"
+MODES, SLOSH = ("bending", "bending_rate"), ("slosh", "slosh_rate")  # blocks of states
 UNCONTROLLED = "uncontrolled"  # wind filter and deviations: no vehicle parameter moves their roots
 
 
-def root_family(state: str) -> str:
-    """Return the family of roots to which a state belongs."""
-    if match := re.fullmatch(r"bending_(?:rate_)?(\d+)", state):
-        return f"bending_{match.group(1)}"
-    if re.match(r"wind_\d|deviation_", state):
-        return UNCONTROLLED
-    return "slosh" if state.startswith("slosh_") else RIGID_BODY
+def state_families(system: LinearSystem) -> list[str]:
+    """Return the family of roots that every state belongs to: a mode, slosh, the rigid body with its control."""
+    families, counts = [], Counter()
+    for state in system.states:
+        counts[state.block] += 1
+        if state.block in MODES:
+            families.append(f"bending_{counts[state.block]}")
+        elif state.block in SLOSH:
+            families.append("slosh")
+        else:
+            families.append(UNCONTROLLED if state.block in (WIND, DEVIATION) else RIGID_BODY)
+    return families
 
 
 def root_families(system: LinearSystem) -> list[str]:
     """Return the families of roots of a system, the uncontrolled one left out."""
-    return [f for f in dict.fromkeys(map(root_family, system.state_names)) if f != UNCONTROLLED]
+    return [f for f in dict.fromkeys(state_families(system)) if f != UNCONTROLLED]
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +79,7 @@ class FrozenRoots:
     def __init__(self, executable: ExecutableSystem, times: Sequence[float], parameters: Sequence[str]):
         system = executable.system
         self.families = root_families(system)
-        self._of_state = np.array([root_family(name) for name in system.state_names])
+        self._of_state = np.array(state_families(system))
         columns = [system.parameter_names.index(name) for name in parameters]
         wanted = system.p[columns]
         A = ca.densify(system.A)

@@ -13,7 +13,7 @@ from scipy.interpolate import CubicSpline
 
 from ...codegen.system.executable import ExecutableSystem
 from ...codegen.system.functions import state_scales
-from ...model.equations.assemble import MEAN_TABLES
+from ...model.equations.vehicle_tables import MEAN_TABLES
 from ...model.tables import TableGroup
 from .integration import Integrator, IntegratorOptions
 from .step_budget import naming_fastest_root

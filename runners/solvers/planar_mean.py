@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ...codegen.system.executable import ExecutableSystem
 from ...codegen.system.functions import INPUTS, OUTPUTS, spline_lookup
 from ...model.construction.planar_equations import PlanarLoop, planar_loop
-from ...model.equations.assemble import MEAN_TABLES, mean_knots
+from ...model.equations.vehicle_tables import MEAN_TABLES, mean_knots
 from ...model.errors import DataError
 from ...model.vehicle.vehicle import Vehicle
 from .integration import Integrator, IntegratorOptions

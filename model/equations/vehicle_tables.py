@@ -1,0 +1,45 @@
+"""The tables of a vehicle in groups: over flight time, over altitude, and the mean response."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from ..tables import TableGroup
+from ..vehicle.vehicle import Vehicle
+
+# tables of the mean response, all in rad, and the output or state that each holds
+MEAN_TABLES = {
+    "mean.angle_of_attack": ("output", "angle_of_attack"),
+    "mean.engine_angle": ("output", "engine_angle"),
+    "mean.attitude": ("state", "attitude"),
+}
+MEAN_SPACING = 0.05  # s, of the tables of the mean response
+
+
+def vehicle_tables(vehicle: Vehicle) -> tuple[TableGroup, ...]:
+    """Return the table groups of a vehicle: over time, over altitude, and the mean response (zero until computed)."""
+    polynomials = [(t.name, t.unit, t.polynomial) for t in vehicle.tables.values()]
+    polynomials.append(("altitude_rate", "m/s", vehicle.tables["altitude"].polynomial.derivative()))
+    flight = TableGroup.from_polynomials("flight", "time", polynomials, vehicle.start, vehicle.end)
+    wind, mean = vehicle.wind.shaping_filter, vehicle.wind.mean
+    over_altitude = [(t.name, t.unit, t.polynomial) for t in (mean, *wind.tables())]
+    bottom = min(float(wind.altitude[0]), float(mean.argument[0]))
+    top = max(float(wind.altitude[-1]), float(mean.argument[-1]))
+    wind_group = TableGroup.from_polynomials("wind", "altitude", over_altitude, bottom, top)
+    knots = mean_knots(vehicle.start, vehicle.end, vehicle.discontinuities)
+    zero = np.zeros((knots.size - 1, 4, len(MEAN_TABLES)))
+    mean_group = TableGroup("mean", "time", tuple(MEAN_TABLES), ("rad",) * len(MEAN_TABLES), knots, zero)
+    return flight, wind_group, mean_group
+
+
+def mean_knots(start: float, end: float, discontinuities: Sequence[float]) -> np.ndarray:
+    """Return the times (s) at which the mean response is tabulated, discontinuities among them."""
+    edges = [start, *discontinuities, end]
+    pieces = [
+        np.linspace(low, high, max(4, int(np.ceil((high - low) / MEAN_SPACING))) + 1)[:-1]
+        for low, high in pairwise(edges)
+    ]
+    return np.append(np.concatenate(pieces), end)
