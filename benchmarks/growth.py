@@ -8,8 +8,8 @@ from collections.abc import Callable
 import casadi as ca
 import numpy as np
 
-from ascentwind.codegen.ensemble.compiled import compiled_ensemble
-from ascentwind.codegen.sweep.compiled import compiled_sweep
+from ascentwind.codegen.ensemble.compiled import ensemble_of
+from ascentwind.codegen.sweep.compiled import sweep_of
 from ascentwind.model import LinearSystem, define_system
 from ascentwind.runners import CovarianceOptions, EnsembleOptions, IntegratorOptions, Study
 from ascentwind.runners.solvers.sweep import batch, sweep
@@ -48,7 +48,7 @@ def growth(study: Study) -> dict[str, Rows]:
         return run
 
     flight = np.arange(11.0, 141.0)
-    member = compiled_sweep(study.system)
+    member = sweep_of(study.executable)
     nominal = study.executable.parameters
 
     def batches(count: int) -> None:
@@ -62,9 +62,9 @@ def growth(study: Study) -> dict[str, Rows]:
 
     # compiled beforehand: growth is of the run
     chains = {states: Study.from_system(chain(states)) for states in SIZES}
-    sweeps = {states: compiled_sweep(found.system) for states, found in chains.items()}
+    sweeps = {states: sweep_of(found.executable) for states, found in chains.items()}
     for found in chains.values():
-        compiled_ensemble(found.system)
+        ensemble_of(found.executable)
 
     def on_chain(engine: str, options: object) -> Callable[[int], None]:
         def run(states: int) -> None:

@@ -1,1 +1,1 @@
-"""From C source to a loaded library: compiler, cache, fingerprint, printer, templates."""
+"""From C source to a loaded library: printer, templates, fingerprint, compiler, cache, and the life of a library."""

@@ -70,7 +70,7 @@ def _c_argument(value: Any) -> Any:
             raise ValueError(f"compiled code reads arrays row by row, and this one of shape {value.shape} has gaps")
         return value.ctypes.data_as(ctypes.c_void_p)
     if isinstance(value, np.generic):
-        return np.ctypeslib.as_ctypes_type(value.dtype)(value.item())
+        return np.ctypeslib.as_ctypes_type(value.dtype.str)(value.item())
     return ctypes.c_double(value) if isinstance(value, float) else ctypes.c_int(value)
 
 

@@ -73,9 +73,9 @@ def regenerate(vehicle: str | Path, folder: Path, changes: Mapping[str, Any] | N
         if path.is_file() and path.read_text(encoding="utf-8") == text:
             states[path] = "unchanged"
             continue
-        changes = describe_changes(before, dict(system.structure)) if before else []
+        differences = describe_changes(before, dict(system.structure)) if before else []
         states[path] = (
-            f"written ({'; '.join(changes) or ('equations, names or code generator changed' if before else 'new')})"
+            f"written ({'; '.join(differences) or ('equations, names or code generator changed' if before else 'new')})"
         )
         write_whole(path, lambda p, text=text: p.write_text(text, encoding="utf-8"))
     return states

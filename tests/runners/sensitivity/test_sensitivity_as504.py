@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ascentwind.codegen.nodes.compiled import node_functions
+from ascentwind.codegen.nodes.compiled import node_functions_of
 from ascentwind.runners import IntegratorOptions
 from ascentwind.runners.sensitivity.check import _with_row, central_difference, of_vehicle
 from ascentwind.runners.sensitivity.gradient import gradient_of
@@ -16,7 +16,9 @@ from ascentwind.runners.solvers.flight_nodes import FlightNodes
 
 def pair_of(as504, executable, step=None, time=30.0) -> AdjointPair:
     """Bending moment from wind alone, which no mean enters."""
-    return AdjointPair(FlightNodes.until(executable, node_functions(as504.system), [time], step), 0, time, ("wind",))
+    return AdjointPair(
+        FlightNodes.until(executable, node_functions_of(as504.executable), [time], step), 0, time, ("wind",)
+    )
 
 
 @pytest.fixture(scope="module")
