@@ -16,7 +16,7 @@ from .bending import mode_column
 
 def moved_modal_force(tables: TableSymbols, reference_area: ca.SX, modes: int, alpha: ca.SX) -> ca.SX:
     """Return what each metre that the normal force moves forward adds to 4-10, N/m, shape (modes,)."""
-    return tables["dynamic_pressure"] * reference_area * mode_column(tables, modes, MOVED_MODE[0]) * alpha
+    return tables["dynamic_pressure"] * reference_area * mode_column(tables, modes, MOVED_MODE.name) * alpha
 
 
 def noise_load(
@@ -55,7 +55,7 @@ def noise_load(
 
 def _load_of_a_metre(form: NoiseLoads, coefficients: Mapping[str, Any], flight: Any, reference_area: Any) -> Any:
     if form == "moved_line":
-        return coefficients[MOVED_LINE[0]]
+        return coefficients[MOVED_LINE.name]
     forward = 1.0 if form == "couple_forward" else 0.0
     couple = flight["dynamic_pressure"] * reference_area * flight["normal_force_slope"]
-    return couple * (forward - coefficients[SECOND_MOMENT[0]] / flight["moment_of_inertia"])
+    return couple * (forward - coefficients[SECOND_MOMENT.name] / flight["moment_of_inertia"])

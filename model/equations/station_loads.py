@@ -13,14 +13,13 @@ from ..errors import DataError, PlausibilityWarning
 from ..files.csv_table import read_csv_table
 from ..files.folder_files import file_inside
 from ..tables import Table
-from ..vehicle.columns import MOVED_LINE, REACTION_COLUMNS, load_columns, local_load_columns
+from ..vehicle.columns import ALONG_ARGUMENTS, MOVED_LINE, TIME, Column, along_columns
 from ..vehicle.noise_loads import needed_columns
 from ..vehicle.vehicle import Vehicle
 
 KEY = "loads_along_vehicle"
 SAME_STATION = 1e-6  # m
 DIFFERENT = 1e-3  # of the largest coefficient
-ARGUMENTS = (("time", "s", ""), ("station", "m", ""), ("forward_of_gimbal", "m", ""))
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,11 +56,6 @@ class StationLoads:
         return {name: np.array([table.polynomial(times) for table in tables]).T for name, tables in self.tables.items()}
 
 
-def along_columns(modes: int, tanks: list[str]) -> tuple[tuple[str, str, str], ...]:
-    """Return the coefficient columns of the table: name, unit, sign."""
-    return (*load_columns(modes, tanks), *REACTION_COLUMNS, MOVED_LINE, *local_load_columns(modes))
-
-
 def load_station_loads(vehicle: Vehicle) -> StationLoads:
     """Read the table that a vehicle names as ``tables.loads_along_vehicle``.
 
@@ -78,12 +72,12 @@ def load_station_loads(vehicle: Vehicle) -> StationLoads:
             column=f"tables.{KEY}",
         )
     file: Path = file_inside(vehicle.folder, entry.file)
-    csv = read_csv_table(file, "time", "s", order="not decreasing")
+    csv = read_csv_table(file, TIME.name, TIME.unit, order="not decreasing")
     columns = along_columns(len(vehicle.bending), [tank.name for tank in vehicle.slosh])
     if MOVED_LINE not in needed_columns(vehicle.file)[0]:
         columns = tuple(column for column in columns if column != MOVED_LINE)
-    for name, unit, _ in (*ARGUMENTS, *columns):
-        csv.column(name, unit)
+    for column in (*ALONG_ARGUMENTS, *columns):
+        csv.column(column.name, column.unit)
     time, station = csv.columns["time"], csv.columns["station"]
     times, stations = np.unique(time), np.unique(station)
     shape = times.size, stations.size
@@ -96,12 +90,12 @@ def load_station_loads(vehicle: Vehicle) -> StationLoads:
         )
     breaks = tuple(sorted(vehicle.file.events[event] for event in entry.events if event in vehicle.file.events))
 
-    def tables(name: str, unit: str) -> tuple[Table, ...]:
-        values = csv.columns[name][order].reshape(shape)
-        return tuple(Table(name, unit, times, row, entry.interpolation, breaks) for row in values.T)
+    def tables(column: Column) -> tuple[Table, ...]:
+        values = csv.columns[column.name][order].reshape(shape)
+        return tuple(Table(column.name, column.unit, times, row, entry.interpolation, breaks) for row in values.T)
 
     forward = csv.columns["forward_of_gimbal"][order].reshape(shape)[0]
-    found = StationLoads(stations, forward, {name: tables(name, unit) for name, unit, _ in columns})
+    found = StationLoads(stations, forward, {column.name: tables(column) for column in columns})
     _compare(vehicle, found, file)
     return found
 

@@ -1,107 +1,162 @@
-"""Every column of every table of a vehicle: name, unit, sign."""
+"""Every column of every table of a vehicle: name, unit, sign and meaning.
+
+The reader, the header that 'ascentwind new-vehicle' writes and docs/tables.md take them from here.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-
-SCHEDULE_COLUMNS = (("factor", "1", ""),)
-
-
-def mode_columns(modes: int) -> tuple[tuple[str, str, str], ...]:
-    """Return the columns of a sensor's table of bending modes: name, unit, sign."""
-    names = [(f"displacement_{i}", f"slope_{i}") for i in range(1, modes + 1)]
-    return tuple(column for y, slope in names for column in ((y, "1", ""), (slope, "1/m", "")))
+from typing import NamedTuple
 
 
-# columns of a load's table by which the rigid body answers slosh: S_1, S_2
-REACTION_COLUMNS = (("first_moment", "kg m", ""), ("second_moment", "kg m2", ""))
+class Column(NamedTuple):
+    """A column: name, unit, what its sign may be ('+' positive, '0' not negative, '' any), meaning."""
+
+    name: str
+    unit: str
+    sign: str
+    meaning: str
+
+    @property
+    def label(self) -> str:
+        """The column's head in a CSV file."""
+        return f"{self.name} [{self.unit}]"
 
 
-def load_columns(modes: int, tanks: Sequence[str]) -> tuple[tuple[str, str, str], ...]:
-    """Return the columns of a load's table: name, unit, sign."""
-    return (
-        ("angle_of_attack", "N m/rad", ""),
-        ("engine_angle", "N m/rad", ""),
-        *((f"bending_{i}", "N s2", "") for i in range(1, modes + 1)),
-        *((f"slosh_{tank}", "N s2", "") for tank in tanks),
-    )
+TIME = Column("time", "s", "", "flight time")
+ALTITUDE = Column("altitude", "m", "", "above sea level")
 
-
-PREFIX = "local."
-
-
-def local_columns(modes: int) -> tuple[tuple[str, str, str], ...]:
-    """Return the columns of the table of integrals: name, unit, sign."""
-    numbers = range(1, modes + 1)
-    return (
-        ("arm", "m/rad", ""),
-        ("arm_squared", "m2/rad", "0"),
-        *((f"arm_displacement_{i}", "m/rad", "") for i in numbers),
-        *((f"slope_{i}", "1/m/rad", "") for i in numbers),
-        *((f"arm_slope_{i}", "1/rad", "") for i in numbers),
-        *((f"displacement_{i}_displacement_{j}", "1/rad", "") for i in numbers for j in numbers if j >= i),
-        *((f"displacement_{i}_slope_{j}", "1/m/rad", "") for i in numbers for j in numbers),
-    )
-
-
-def local_load_columns(modes: int) -> tuple[tuple[str, str, str], ...]:
-    """Return the columns of a load's table of local terms: name, unit, sign."""
-    numbers = range(1, modes + 1)
-    return (
-        ("attitude_rate", "N m s/rad", ""),
-        *((f"bending_displacement_{i}", "N", "") for i in numbers),
-        *((f"bending_rate_{i}", "N s", "") for i in numbers),
-    )
-
-
-Column = tuple[str, str, str]  # name, unit, sign
-
-
-MOVED_LINE: Column = ("center_of_pressure", "N/rad", "")  # of a load: moment for each rad and metre moved
-
-
-MOVED_MODE: Column = ("normal_force_slope_times_slope", "1/m/rad", "")  # of a mode: int c'_N dY_i/dx dx
-
-
-SECOND_MOMENT: Column = ("second_moment", "kg m2", "")  # of a load: S_2
-
-
-# Columns by role: (name, unit, sign). '+' positive, '0' not negative, '' any.
-RIGID_BODY = (("mass", "kg", "+"), ("moment_of_inertia", "kg m2", "+"), ("center_of_gravity", "m", ""))
-
-
+RIGID_BODY = (
+    Column("mass", "kg", "+", "of the whole vehicle with all liquid"),
+    Column("moment_of_inertia", "kg m2", "+", "in pitch and yaw about the centre of gravity, all liquid frozen"),
+    Column("center_of_gravity", "m", "", "forward of the gimbal plane"),
+)
 TRAJECTORY = (
-    ("altitude", "m", ""),
-    ("relative_velocity", "m/s", "+"),
-    ("dynamic_pressure", "Pa", "0"),
-    ("axial_acceleration", "m/s2", ""),
-    ("axial_drag", "N", ""),
+    Column("altitude", "m", "", "above sea level; increases"),
+    Column("relative_velocity", "m/s", "+", "speed through air without wind"),
+    Column("dynamic_pressure", "Pa", "0", "of that speed"),
+    Column("axial_acceleration", "m/s2", "", "(thrust - axial_drag) / mass"),
+    Column("axial_drag", "N", "", "air force along the axis, positive aft"),
+)
+PROPULSION = (
+    Column("thrust", "N", "0", "of all engines"),
+    Column("control_thrust", "N", "0", "of those that are gimballed; lateral force for each rad of engine angle"),
+)
+AERODYNAMICS = (
+    Column("normal_force_slope", "1/rad", "", "C'_N of the whole vehicle on the reference area"),
+    Column("center_of_pressure", "m", "", "where it acts, forward of the gimbal plane"),
+)
+GAINS = (
+    Column("attitude_factor", "1", "", "on T1(s), behind the network"),
+    Column("rate_factor", "1", "", "on T2(s), behind the network"),
+)
+SCHEDULE = (Column("factor", "1", "", "on the gain of a load-relief sensor"),)
+SLOSH = (
+    Column("mass", "kg", "+", "of the liquid that sloshes, the first lateral mode"),
+    Column("frequency", "rad/s", "+", "of that mode at the axial acceleration of the time"),
+    Column("attach_point", "m", "", "where it pushes the tank, forward of the gimbal plane"),
+)
+WIND = (
+    Column("mean", "m/s", "", "mean wind in the yaw plane"),
+    Column("standard_deviation", "m/s", "+", "of the wind about its mean"),
+)
+
+# of a load, by which the rigid body answers slosh
+SECOND_MOMENT = Column(
+    "second_moment", "kg m2", "", "S_2: mass forward of s times (x - s)(x - X_CG), and rotary inertia"
+)
+REACTION = (Column("first_moment", "kg m", "", "S_1: mass forward of s times x - s"), SECOND_MOMENT)
+# of a load and of a mode, where the centre of pressure deviates
+MOVED_LINE = Column(
+    "center_of_pressure",
+    "N/rad",
+    "",
+    "dM'_alpha/dX_CP: moment for each rad and metre that the air force moves",
+)
+MOVED_MODE = Column(
+    "normal_force_slope_times_slope", "1/m/rad", "", "what each metre of that move adds to the air force on the mode"
 )
 
 
-PROPULSION = (("thrust", "N", "0"), ("control_thrust", "N", "0"))
-
-
-AERODYNAMICS = (("normal_force_slope", "1/rad", ""), ("center_of_pressure", "m", ""))
-
-
-GAINS = (("attitude_factor", "1", ""), ("rate_factor", "1", ""))
-
-
-SLOSH = (("mass", "kg", "+"), ("frequency", "rad/s", "+"), ("attach_point", "m", ""))
-
-
-WIND = (("mean", "m/s", ""), ("standard_deviation", "m/s", "+"))
-
-
-def _bending_columns(tanks: list[str]):
+def bending_columns(tanks: Sequence[str]) -> tuple[Column, ...]:
+    """Return the columns of a bending mode."""
     return (
-        ("frequency", "rad/s", "+"),
-        ("generalized_mass", "kg", "+"),
-        ("displacement_at_gimbal", "1", ""),
-        ("slope_at_gimbal", "1/m", ""),
-        ("slope_at_sensor", "1/m", ""),
-        ("normal_force_slope_times_displacement", "1/rad", ""),
-        *((f"displacement_at_{tank}", "1", "") for tank in tanks),
-        *((f"slope_at_{tank}", "1/m", "") for tank in tanks),
+        Column("frequency", "rad/s", "+", "of the free-free mode, all liquid frozen"),
+        Column("generalized_mass", "kg", "+", "of the mode with the displacement scaled as below"),
+        Column("displacement_at_gimbal", "1", "", "Y_i at the gimbal plane; any scale, the same in all columns"),
+        Column("slope_at_gimbal", "1/m", "", "turn of the section at the gimbal plane"),
+        Column("slope_at_sensor", "1/m", "", "turn where attitude and attitude rate are measured"),
+        Column("normal_force_slope_times_displacement", "1/rad", "", "sum over the vehicle of c'_N Y_i"),
+        *(Column(f"displacement_at_{tank}", "1", "", f"at the attach point of {tank}") for tank in tanks),
+        *(Column(f"slope_at_{tank}", "1/m", "", f"turn at the attach point of {tank}") for tank in tanks),
     )
+
+
+def mode_columns(modes: int) -> tuple[Column, ...]:
+    """Return the columns of the bending modes at a load-relief sensor."""
+    pairs = (
+        (
+            Column(f"displacement_{i}", "1", "", f"of mode {i} at the sensor"),
+            Column(f"slope_{i}", "1/m", "", f"turn of mode {i} at the sensor"),
+        )
+        for i in range(1, modes + 1)
+    )
+    return tuple(column for pair in pairs for column in pair)
+
+
+def load_columns(modes: int, tanks: Sequence[str]) -> tuple[Column, ...]:
+    """Return the columns of a load (4-13)."""
+    return (
+        Column("angle_of_attack", "N m/rad", "", "M'_alpha: moment for each rad of angle of attack"),
+        Column("engine_angle", "N m/rad", "", "M'_beta: moment for each rad of engine angle"),
+        *(Column(f"bending_{i}", "N s2", "", f"M'_eta: moment for each m/s2 of mode {i}") for i in range(1, modes + 1)),
+        *(Column(f"slosh_{tank}", "N s2", "", f"M'_xi: moment for each m/s2 of the slosh in {tank}") for tank in tanks),
+    )
+
+
+PREFIX = "local."  # of the tables of the local angle of attack
+
+
+def local_columns(modes: int) -> tuple[Column, ...]:
+    """Return the columns of the integrals of the normal force for the local angle of attack, arms x - X_CG."""
+    numbers = range(1, modes + 1)
+    return (
+        Column("arm", "m/rad", "", "integral of c'_N times arm"),
+        Column("arm_squared", "m2/rad", "0", "of c'_N times arm squared"),
+        *(Column(f"arm_displacement_{i}", "m/rad", "", f"of c'_N times arm times Y_{i}") for i in numbers),
+        *(Column(f"slope_{i}", "1/m/rad", "", f"of c'_N times Y'_{i}") for i in numbers),
+        *(Column(f"arm_slope_{i}", "1/rad", "", f"of c'_N times arm times Y'_{i}") for i in numbers),
+        *(
+            Column(f"displacement_{i}_displacement_{j}", "1/rad", "", f"of c'_N times Y_{i} Y_{j}")
+            for i in numbers
+            for j in numbers
+            if j >= i
+        ),
+        *(
+            Column(f"displacement_{i}_slope_{j}", "1/m/rad", "", f"of c'_N times Y_{i} Y'_{j}")
+            for i in numbers
+            for j in numbers
+        ),
+    )
+
+
+def local_load_columns(modes: int) -> tuple[Column, ...]:
+    """Return the columns of a load for the local angle of attack."""
+    numbers = range(1, modes + 1)
+    return (
+        Column("attitude_rate", "N m s/rad", "", "moment for each rad/s of turning"),
+        *(Column(f"bending_displacement_{i}", "N", "", f"moment for each m of mode {i}") for i in numbers),
+        *(Column(f"bending_rate_{i}", "N s", "", f"moment for each m/s of mode {i}") for i in numbers),
+    )
+
+
+ALONG_ARGUMENTS = (
+    TIME,
+    Column("station", "m", "", "of the vehicle"),
+    Column("forward_of_gimbal", "m", "", "the same forward of the gimbal plane"),
+)
+
+
+def along_columns(modes: int, tanks: Sequence[str]) -> tuple[Column, ...]:
+    """Return the coefficient columns of the loads along the vehicle."""
+    return (*load_columns(modes, tanks), *REACTION, MOVED_LINE, *local_load_columns(modes))

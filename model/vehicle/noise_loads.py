@@ -70,7 +70,7 @@ def form_of_tables(folder: Path, toml: Path, file: VehicleFile) -> tuple[NoiseLo
 
     def lacking(entries: Iterable[str], column: Column) -> str | None:
         tables = ((entry, read_csv_table(file_inside(folder, entry), "time", "s").columns) for entry in entries)
-        return next((entry for entry, columns in tables if column[0] not in columns), None)
+        return next((entry for entry, columns in tables if column.name not in columns), None)
 
     loads, modes = [load.table.file for load in file.loads], [mode.table.file for mode in file.bending]
     missing = [
@@ -79,14 +79,14 @@ def form_of_tables(folder: Path, toml: Path, file: VehicleFile) -> tuple[NoiseLo
     if not missing:
         return "moved_line", None
     bound = bool(loads) and lacking(loads, SECOND_MOMENT) is None
-    table, (name, unit, _) = missing[0]
+    table, column = missing[0]
     taken = (
         '"couple_aft", a bound: the couple of the centre of pressure wholly aft of the station'
         if bound
         else '"as_reported": thrust and centre of pressure load the station through accelerations alone'
     )
     return "couple_aft" if bound else "as_reported", NoiseLoadsWarning(
-        f"{folder / table}: has no column '{name} [{unit}]', which options.noise_loads = \"moved_line\" needs. Taken "
+        f"{folder / table}: has no column '{column.label}', which options.noise_loads = \"moved_line\" needs. Taken "
         f"instead: {taken}. 'ascentwind build-vehicle' writes the column; to keep the lesser form without this warning "
         f"name it under [options] in {toml.name}"
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -22,18 +22,21 @@ from ..wind.shaping_filter import TwoPartKernel
 from ..wind.statistics import WindModel, check_plausible, closed_form_filter, report_standard_deviation
 from .columns import (
     AERODYNAMICS,
+    ALTITUDE,
     GAINS,
     MOVED_LINE,
     MOVED_MODE,
     PREFIX,
     PROPULSION,
-    REACTION_COLUMNS,
+    REACTION,
     RIGID_BODY,
-    SCHEDULE_COLUMNS,
+    SCHEDULE,
     SLOSH,
+    TIME,
     TRAJECTORY,
     WIND,
-    _bending_columns,
+    Column,
+    bending_columns,
     load_columns,
     local_columns,
     local_load_columns,
@@ -93,7 +96,7 @@ def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehi
     file = _with_noise_loads(file, folder, toml)
     of_loads, of_modes = needed_columns(file)
     for i, mode in enumerate(file.bending, start=1):
-        reader.add(f"bending.{i}", mode.table, (*_bending_columns(tanks), *of_modes), f"bending.{i}.", (MOVED_MODE,))
+        reader.add(f"bending.{i}", mode.table, (*bending_columns(tanks), *of_modes), f"bending.{i}.", (MOVED_MODE,))
     for tank in file.slosh:
         reader.add(f"slosh.{tank.name}", tank.table, SLOSH, f"slosh.{tank.name}.")
     for load in file.loads:
@@ -105,8 +108,8 @@ def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehi
                     file=toml,
                     column=f"loads.{load.output}.forward_of_gimbal_m",
                 )
-            columns |= dict.fromkeys(REACTION_COLUMNS)
-        unused = (*REACTION_COLUMNS, MOVED_LINE)
+            columns |= dict.fromkeys(REACTION)
+        unused = (*REACTION, MOVED_LINE)
         reader.add(f"loads.{load.output}", load.table, tuple(columns), f"loads.{load.output}.", unused)
     if file.options.local_angle_of_attack:
         _add_local(reader, file)
@@ -187,11 +190,11 @@ def _add_load_relief(reader: _Reader, file: VehicleFile) -> None:
     for sensor, entry in file.control.load_relief.items():
         prefix = f"control.{sensor}."
         if entry.schedule:
-            reader.add(f"{prefix}schedule", entry.schedule, SCHEDULE_COLUMNS, prefix)
+            reader.add(f"{prefix}schedule", entry.schedule, SCHEDULE, prefix)
         if entry.modes:
             reader.add(f"load_relief.{sensor}", entry.modes, mode_columns(len(file.bending)), prefix)
         elif file.bending:
-            columns = ", ".join(f"{name} [{unit}]" for name, unit, _ in mode_columns(len(file.bending)))
+            columns = ", ".join(column.label for column in mode_columns(len(file.bending)))
             raise DataError(
                 f"is missing; name a table of {columns} at the sensor", file=reader.toml, column=f"{prefix}modes"
             )
@@ -224,33 +227,47 @@ class _Reader:
         self.collector = DataErrorCollector()
         self.schedules: dict[str, tuple[Table, Path]] = {}
 
-    def read(self, name: str, entry: TableEntry, columns, argument: str, unit: str, unused=()) -> CsvTable:
-        csv = read_csv_table(file_inside(self.folder, entry.file), argument, unit)
-        x, collector = csv.columns[argument], DataErrorCollector()
-        for column, column_unit, sign in columns:
+    def read(
+        self,
+        name: str,
+        entry: TableEntry,
+        columns: Iterable[Column],
+        argument: Column,
+        unused: Iterable[Column] = (),
+    ) -> CsvTable:
+        columns = tuple(columns)
+        csv = read_csv_table(file_inside(self.folder, entry.file), argument.name, argument.unit)
+        x, collector = csv.columns[argument.name], DataErrorCollector()
+        for column in columns:
             with collector.part():
-                csv.column(column, column_unit)
-                if sign:
-                    csv.require_positive(column, allow_zero=sign == "0")
+                csv.column(column.name, column.unit)
+                if column.sign:
+                    csv.require_positive(column.name, allow_zero=column.sign == "0")
         collector.raise_all()
-        unknown = set(csv.columns) - {c for c, _, _ in (*columns, *unused)} - {argument}
+        unknown = set(csv.columns) - {column.name for column in (*columns, *unused)} - {argument.name}
         if unknown:
-            name = sorted(unknown)[0]
-            raise DataError(
-                f"is not a column that this table uses{suggestion(name, [c for c, _, _ in columns])}; remove it",
-                file=csv.file,
-                column=name,
-            )
+            first, known = sorted(unknown)[0], [column.name for column in columns]
+            why = f"is not a column that this table uses{suggestion(first, known)}; remove it"
+            raise DataError(why, file=csv.file, column=first)
         self.sources.append(TableSource(name, csv.file, entry.status, entry.source, float(x[0]), float(x[-1])))
         return csv
 
-    def add(self, name: str, entry: TableEntry, columns, prefix: str = "", unused=()) -> None:
+    def add(
+        self,
+        name: str,
+        entry: TableEntry,
+        columns: Sequence[Column],
+        prefix: str = "",
+        unused: Iterable[Column] = (),
+    ) -> None:
         """Read a table; what is wrong with it is kept in ``collector``."""
         with self.collector.part():
             self._add(name, entry, columns, prefix, unused)
 
-    def _add(self, name: str, entry: TableEntry, columns, prefix: str, unused) -> None:
-        csv = self.read(name, entry, columns, "time", "s", unused)
+    def _add(
+        self, name: str, entry: TableEntry, columns: Sequence[Column], prefix: str, unused: Iterable[Column]
+    ) -> None:
+        csv = self.read(name, entry, columns, TIME, unused)
         for event in entry.events:
             if event not in self.events:
                 raise DataError(
@@ -264,7 +281,7 @@ class _Reader:
         _warn_of_gap(csv)
         if entry.interpolation == "step":
             self.discontinuities.update(x[1:].tolist())
-        for column, unit, sign in columns:
+        for column, unit, sign, _ in columns:
             try:
                 table = Table(prefix + column, unit, x, csv.columns[column], entry.interpolation, breaks)
                 self._check_between_rows(table, sign)
@@ -312,7 +329,7 @@ def _warn_of_gap(csv: CsvTable) -> None:
 
 
 def _load_wind(folder: Path, entry: WindEntry, reader: _Reader) -> WindModel:
-    csv = reader.read("wind", entry.statistics, WIND, "altitude", "m")
+    csv = reader.read("wind", entry.statistics, WIND, ALTITUDE)
     h, mean, sigma = (csv.columns[name] for name in ("altitude", "mean", "standard_deviation"))
     record = _wind_record(entry.record, reader.toml)
     try:

@@ -7,13 +7,16 @@ import io
 import re
 import shutil
 import tempfile
+from collections.abc import Iterable
 from pathlib import Path
 
 from ...model.construction.construction_file import CONSTRUCTION_FILE, construction_files
 from ...model.errors import OutputFolderError
 from ...model.files.folder_files import unsafe_to_copy
+from ...model.vehicle.columns import Column
 from ...model.vehicle.reader import VEHICLE_FILE, load_vehicle
 from ...model.vehicle.shipped import find_vehicle
+from ...model.vehicle.table_columns import table_columns
 
 COPIED = "copied from "
 SOURCE = re.compile(rf'(?<![\w"\'])((?:\w+_)?source\s*=\s*")(?!"|{COPIED})')
@@ -31,7 +34,8 @@ def copy_vehicle(source: str | Path, folder: Path) -> list[Path]:
         If the folder exists and is not empty, lies inside the vehicle copied, or cannot be made.
     """
     start = find_vehicle(source)
-    origin = load_vehicle(start).name
+    vehicle = load_vehicle(start)
+    origin = vehicle.name
     if folder.resolve().is_relative_to(start.resolve()):
         raise OutputFolderError(f"{folder} lies inside {start}, the vehicle to copy; choose a folder beside it")
     name = re.sub(r"[^A-Za-z0-9_]", "_", folder.resolve().name)
@@ -51,10 +55,23 @@ def copy_vehicle(source: str | Path, folder: Path) -> list[Path]:
             if (made / CONSTRUCTION_FILE).is_file():
                 for file in construction_files(made)[1:]:
                     file.write_text(sourced_rows(file.read_text(encoding="utf-8-sig"), origin), encoding="utf-8")
+            for file, columns in table_columns(vehicle.file).items():
+                table = made / file
+                table.write_text(explained(table.read_text(encoding="utf-8-sig"), columns), encoding="utf-8")
             made.replace(folder)
     except OSError as error:
         raise OutputFolderError(f"{folder} cannot be made ({error.strerror or error}); choose another folder") from None
     return sorted(folder.iterdir())
+
+
+def explained(text: str, columns: Iterable[Column]) -> str:
+    """Return a CSV table with what its columns are in comments above its header."""
+    lines = text.splitlines()
+    header = next(i for i, line in enumerate(lines) if line.strip() and not line.lstrip().startswith("#"))
+    present = {cell.strip() for cell in next(csv.reader([lines[header]]))}
+    said = [f"# {column.label}: {column.meaning}" for column in columns if column.label in present]
+    new = [line for line in said if line not in lines]
+    return "\n".join([*lines[:header], *new, *lines[header:]]) + "\n"
 
 
 def renamed(text: str, name: str, origin: str) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from ...model.equations.station_loads import ARGUMENTS
+from ...model.vehicle.columns import ALONG_ARGUMENTS
 from ...model.vehicle.vehicle_file import VehicleFile
 from .loads import load_columns, local_load_columns
 from .vehicle_numbers import VehicleNumbers
@@ -131,7 +131,7 @@ def _bending(numbers: VehicleNumbers, mode: int) -> Columns:
 
 
 def _sensor(numbers: VehicleNumbers, position: float) -> Columns:
-    """Return the columns of model/equations/load_relief.py: mode_columns."""
+    """Return the columns of model/vehicle/columns.py: mode_columns."""
     found: Columns = {}
     for mode in range(numbers.construction.bending_modes):
         shapes = numbers.modes.displacement[:, mode], numbers.modes.rotation[:, mode]
@@ -162,7 +162,7 @@ def _along(numbers: VehicleNumbers, start: float) -> Columns:
     times = times[max(0, int(np.searchsorted(times, start, side="right")) - 1) :]
     gimbal = numbers.construction.gimbal_station
     values = (np.repeat(times, stations.size), *(np.tile(x, times.size) for x in (stations + gimbal, stations)))
-    arguments = {(name, unit): value for (name, unit, _), value in zip(ARGUMENTS, values, strict=True)}
+    arguments = {(column.name, column.unit): value for column, value in zip(ALONG_ARGUMENTS, values, strict=True)}
     by_station = [_load(numbers, s) | _local_load(numbers, s) for s in range(stations.size)]
     return arguments | {
         key: np.array([found[key][-times.size :] for found in by_station]).T.ravel() for key in by_station[0]
@@ -170,7 +170,7 @@ def _along(numbers: VehicleNumbers, start: float) -> Columns:
 
 
 def _local_integrals(numbers: VehicleNumbers) -> Columns:
-    """Return the columns of model/equations/local_aerodynamics.py: local_columns."""
+    """Return the columns of model/vehicle/columns.py: local_columns."""
     arm = numbers.line.points - numbers.properties.center_of_gravity[:, None]
     Y, turn = np.moveaxis(numbers.displacement, 1, 0), np.moveaxis(numbers.rotation, 1, 0)
     modes = range(numbers.construction.bending_modes)

@@ -121,7 +121,7 @@ def station_rows(
     zero = np.zeros((times.size, loads.station.size))
     columns |= {f"slosh_displacement_{tank}": zero for tank in tanks}
     if not study.vehicle.file.options.local_angle_of_attack:
-        columns |= {name: zero for name, _, _ in local_load_columns(len(study.vehicle.bending))}
+        columns |= {column.name: zero for column in local_load_columns(len(study.vehicle.bending))}
     at = [study.tables(float(time)) for time in times]
     flight = {name: np.array([tables[name] for tables in at])[:, None] for name in at[0]}
     if slosh_reaction:

@@ -39,8 +39,8 @@ def switched(folder: Path) -> Path:
 
 
 def write(file: Path, columns, values: dict[str, float]) -> None:
-    header = ",".join(["time [s]", *(f"{name} [{unit}]" for name, unit, _ in columns)])
-    row = ",".join(repr(float(values[name])) for name, _, _ in columns)
+    header = ",".join(["time [s]", *(column.label for column in columns)])
+    row = ",".join(repr(float(values[column.name])) for column in columns)
     file.write_text(header + "".join(f"\n{t},{row}" for t in (0, 80, 200, 300)) + "\n")
 
 

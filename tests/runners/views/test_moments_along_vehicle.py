@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 from ascentwind.model import load_vehicle
-from ascentwind.model.equations.station_loads import along_columns
 from ascentwind.model.errors import DataError, IntegrationError
 from ascentwind.model.files.csv_table import read_csv_table
-from ascentwind.model.vehicle.columns import REACTION_COLUMNS, local_columns, local_load_columns
+from ascentwind.model.vehicle.columns import REACTION, along_columns, local_columns, local_load_columns
 from ascentwind.model.vehicle.shipped import built_in_vehicles
 from ascentwind.runners import Study
 from ascentwind.runners.solvers.covariance import CovarianceOptions
@@ -43,16 +42,16 @@ def folder(tmp_path_factory) -> Path:
     tanks, modes = [tank.name for tank in vehicle.slosh], len(vehicle.bending)
     shipped = read_csv_table(AS504 / vehicle.file.loads[0].table.file, "time", "s").columns
     time, rng = shipped["time"], np.random.default_rng(3)
-    local_names = [name for name, _, _ in local_load_columns(modes)]
+    local_names = [c.name for c in local_load_columns(modes)]
     per_station = []
     for k, (output, (station, forward)) in enumerate(STATIONS.items()):
         columns = {
             f"{name} [{unit}]": shipped[name] * (1 - 0.6 * k) if name in shipped else 0 * time
-            for name, unit, _ in along_columns(modes, tanks)
+            for name, unit, *_ in along_columns(modes, tanks)
         }
         columns["first_moment [kg m]"] = 3e7 / (1 + k) * (1 - 0.001 * time)
         columns["second_moment [kg m2]"] = 5e8 / (1 + k) * (1 - 0.001 * time)
-        for name, unit, _ in local_load_columns(modes):
+        for name, unit, *_ in local_load_columns(modes):
             columns[f"{name} [{unit}]"] = rng.uniform(-1e5, 1e5) * (1 + 0.01 * time)
         is_local = {key: key.split(" ")[0] in local_names for key in columns}
         write(made / f"{output}.csv", {"time [s]": time} | {k: v for k, v in columns.items() if not is_local[k]})
@@ -63,7 +62,7 @@ def folder(tmp_path_factory) -> Path:
     write(made / ALONG, long)
     write(
         made / "local_aerodynamics.csv",
-        {"time [s]": time[[0, 1, -2, -1]]} | {f"{n} [{u}]": np.full(4, 1e-3) for n, u, _ in local_columns(modes)},
+        {"time [s]": time[[0, 1, -2, -1]]} | {f"{n} [{u}]": np.full(4, 1e-3) for n, u, *_ in local_columns(modes)},
     )
     text = (made / "vehicle.toml").read_text()
     first, last = text.index("[[loads]]"), text.index("# Relative deviations of tables")
@@ -133,6 +132,6 @@ def test_refusals_say_what_to_do(folder, tmp_path):
     with pytest.raises(DataError, match=r"bending_moment_b\.forward_of_gimbal_m.*slosh_reaction needs it"):
         Study.load(spoiled, changes={"options.slosh_reaction": True})
     table = spoiled / "bending_moment.csv"
-    table.write_text(table.read_text().replace(REACTION_COLUMNS[0][0], "moment_first"))
+    table.write_text(table.read_text().replace(REACTION[0].name, "moment_first"))
     with pytest.raises(DataError, match=r"bending_moment\.csv.*first_moment"):
         Study.load(spoiled, changes={"options.slosh_reaction": True, "loads.1.forward_of_gimbal_m": 57.46})

@@ -1,0 +1,32 @@
+"""Which columns each table of a vehicle may hold."""
+
+from __future__ import annotations
+
+from . import columns as c
+from .columns import Column
+from .vehicle_file import VehicleFile
+
+
+def table_columns(file: VehicleFile) -> dict[str, tuple[Column, ...]]:
+    """Return by file name every column that a table of a vehicle has a use for, its argument first."""
+    modes, tanks = len(file.bending), [tank.name for tank in file.slosh]
+    tables, control = file.tables, file.control
+    found = {
+        tables.rigid_body.file: c.RIGID_BODY,
+        tables.trajectory.file: c.TRAJECTORY,
+        tables.propulsion.file: c.PROPULSION,
+        tables.aerodynamics.file: c.AERODYNAMICS,
+        control.gains.file: c.GAINS,
+        **{mode.table.file: (*c.bending_columns(tanks), c.MOVED_MODE) for mode in file.bending},
+        **{tank.table.file: c.SLOSH for tank in file.slosh},
+        **{load.table.file: (*c.load_columns(modes, tanks), *c.REACTION, c.MOVED_LINE) for load in file.loads},
+        **{load.local.file: c.local_load_columns(modes) for load in file.loads if load.local},
+        **{sensor.modes.file: c.mode_columns(modes) for sensor in control.load_relief.values() if sensor.modes},
+        **{sensor.schedule.file: c.SCHEDULE for sensor in control.load_relief.values() if sensor.schedule},
+    }
+    if tables.local_aerodynamics:
+        found[tables.local_aerodynamics.file] = c.local_columns(modes)
+    found = {name: (c.TIME, *columns) for name, columns in found.items()}
+    if tables.loads_along_vehicle:
+        found[tables.loads_along_vehicle.file] = (*c.ALONG_ARGUMENTS, *c.along_columns(modes, tanks))
+    return found | {file.wind.statistics.file: (c.ALTITUDE, *c.WIND)}

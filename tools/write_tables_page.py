@@ -1,0 +1,53 @@
+"""Writes docs/tables.md: every column of every table of a vehicle, from model/vehicle/columns.py.
+
+python tools/write_tables_page.py
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from ascentwind.model.vehicle import columns as c
+
+PAGE = Path(__file__).parents[1] / "docs" / "tables.md"
+SIGNS = {"+": "above 0", "0": "0 or above", "": ""}
+TABLES: tuple[tuple[str, Sequence[c.Column]], ...] = (
+    ("`[tables.rigid_body]`", (c.TIME, *c.RIGID_BODY)),
+    ("`[tables.trajectory]`", (c.TIME, *c.TRAJECTORY)),
+    ("`[tables.propulsion]`", (c.TIME, *c.PROPULSION)),
+    ("`[tables.aerodynamics]`", (c.TIME, *c.AERODYNAMICS)),
+    ("`[control.gains]`", (c.TIME, *c.GAINS)),
+    ("`[[bending]]`, a mode", (c.TIME, *c.bending_columns(["TANK"]))),
+    ("`[[bending]]`, where a centre of pressure deviates", (c.MOVED_MODE,)),
+    ("`[[slosh]]`, a tank", (c.TIME, *c.SLOSH)),
+    ("`[[loads]]`, a station s", (c.TIME, *c.load_columns(1, ["TANK"]))),
+    ("`[[loads]]`, for `options.slosh_reaction` and noises", (*c.REACTION, c.MOVED_LINE)),
+    ("`[loads.local]`, for `options.local_angle_of_attack`", (c.TIME, *c.local_load_columns(1))),
+    ("`[tables.local_aerodynamics]`, for the same", (c.TIME, *c.local_columns(1))),
+    ("`[tables.loads_along_vehicle]`, besides the columns of all `[[loads]]`", c.ALONG_ARGUMENTS),
+    ("`[control.accelerometer.modes]`, `[control.angle_of_attack.modes]`", (c.TIME, *c.mode_columns(1))),
+    ("`[control.accelerometer.schedule]`, `[control.angle_of_attack.schedule]`", (c.TIME, *c.SCHEDULE)),
+    ("`[wind.statistics]`", (c.ALTITUDE, *c.WIND)),
+)
+
+
+def page() -> str:
+    """Return the page."""
+    lines = [
+        "# Tables of a vehicle",
+        "",
+        "The columns of the CSV files that a `vehicle.toml` names: `name [unit]` in the header, in any order.",
+        "`tools/write_tables_page.py` writes this page from `model/vehicle/columns.py`, from which",
+        "`ascentwind new-vehicle` takes the comments above its tables. Modes count from 1 (shown here for one",
+        "mode), TANK is the name of a tank under `[[slosh]]`. x is metres forward of the gimbal plane, X_CG the",
+        "centre of gravity, s a load station, c'_N the local normal-force slope.",
+    ]
+    for title, columns in TABLES:
+        lines += ["", f"## {title}", "", "| column | sign | meaning |", "|---|---|---|"]
+        lines += [f"| `{column.label}` | {SIGNS[column.sign]} | {column.meaning} |" for column in columns]
+    return "\n".join(lines) + "\n"
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), encoding="utf-8")
