@@ -15,8 +15,9 @@ from ascentwind.codegen.system.functions import CoreFunctions, core_functions
 from ascentwind.model import LinearSystem, Vehicle, load_vehicle
 from ascentwind.model.equations.assemble import assemble
 from ascentwind.model.tables import table_values
+from ascentwind.model.vehicle.shipped import built_in_vehicles
 
-VEHICLE = Path(__file__).parents[3] / "model" / "vehicles" / "as504"
+VEHICLE = built_in_vehicles()["as504"]
 TIMES = (12.3, 47.0, 75.0, 110.0, 140.0)
 # switch times (s, range time) and gains a0, a1 (s) of the first stage, found in the flight programmes (docs/data.md)
 GAINS = ((0.0, (0.90, 0.69)), (105.6, (0.45, 0.44)), (130.6, (0.32, 0.30)))

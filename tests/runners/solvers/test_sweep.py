@@ -8,7 +8,6 @@ import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from pathlib import Path
 
 import casadi as ca
 import numpy as np
@@ -25,6 +24,7 @@ from ascentwind.model import load_vehicle
 from ascentwind.model.equations.assemble import assemble
 from ascentwind.model.errors import DataError, DirectNoiseError, IntegrationError, TimeRangeError
 from ascentwind.model.system.define import define_system
+from ascentwind.model.vehicle.shipped import built_in_vehicles
 from ascentwind.runners.solvers.adjoint import AdjointSolver
 from ascentwind.runners.solvers.cores import available_cores
 from ascentwind.runners.solvers.covariance import covariance_equation
@@ -32,7 +32,7 @@ from ascentwind.runners.solvers.integration import IntegratorOptions
 from ascentwind.runners.solvers.mean_response import with_mean_tables
 from ascentwind.runners.solvers.sweep import BatchError, batch, sweep, with_sweep_mean_tables
 
-VEHICLE = Path(__file__).parents[3] / "model" / "vehicles" / "as504"
+VEHICLE = built_in_vehicles()["as504"]
 START = np.diag([1.0, 3.0, 1.0])  # any covariance of the wind filter's states serves for a comparison
 TEN = [10.5, 12.0, 20.0, 40.0, 75.0, 90.0, 105.6, 107.0, 134.34, 140.0]  # two on jumps of the tables
 
