@@ -139,6 +139,15 @@ def test_runners_are_rooms():
     assert sorted(flat) == ["__init__.py", "study.py"]
 
 
+def test_rooms_say_what_they_are():
+    unsaid = []
+    for folder in {path.parent for path in MODULES.values()}:
+        init = folder / "__init__.py"
+        if not init.is_file() or ast.get_docstring(ast.parse(init.read_text())) is None:
+            unsaid.append(folder.relative_to(PACKAGE).as_posix())
+    assert unsaid == []
+
+
 def test_no_room_is_named_in_a_file_name():
     crowded = []
     for folder in {p.parent for p in MODULES.values()}:
