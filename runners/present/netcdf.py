@@ -22,7 +22,7 @@ def unit_factors(text: str) -> dict[str, float]:
     """Return the powers of a unit's factors, 'm/s2' as {'m': 1, 's': -2}; what is no such product is one factor."""
     found: dict[str, float] = {}
     sign = 1
-    for token in re.findall(r"/|[^\s/*·]+", text):
+    for token in re.findall(r"/|[^\s/*·]+", re.sub(r"sqrt\(([^\W\d]+)\)", r"\1^0.5", text)):
         if token == "/":
             sign = -1
             continue
@@ -60,7 +60,9 @@ def variable_name(text: str) -> str:
     return name if name[0].isalpha() else f"_{name}"
 
 
-def one_unit_a_variable(dataset: xr.Dataset, units: Mapping[str, Sequence[str]]) -> xr.Dataset:
+def one_unit_a_variable(
+    dataset: xr.Dataset, units: Mapping[str, Sequence[str]], words: Mapping[str, str] | None = None
+) -> xr.Dataset:
     """Return a dataset in which every entry along some dimensions is a variable with its own unit.
 
     ``std`` (time, response, source) becomes ``bending_moment_std`` (time, source), ``angle_of_attack_std`` and so on.
@@ -74,11 +76,13 @@ def one_unit_a_variable(dataset: xr.Dataset, units: Mapping[str, Sequence[str]])
         A variable has either ``units``, or ``unit_rule``, a product of units and names of its dimensions.
     units : mapping of dimension to sequence of str
         The unit of each entry.
+    words : mapping of str to str, optional
+        Units that other words of rules stand for. With it only variables that have a rule are split.
     """
     variables: dict[str, xr.Variable] = {}
     for quantity, values in dataset.data_vars.items():
         split = [d for d in values.dims if d in units]
-        if not split:
+        if not split or (words is not None and RULE not in values.attrs):
             _add(variables, str(quantity), values.variable)
             continue
         symmetric = len(split) == 2 and list(dataset[split[0]].values) == list(dataset[split[1]].values)
@@ -92,11 +96,12 @@ def one_unit_a_variable(dataset: xr.Dataset, units: Mapping[str, Sequence[str]])
             part.attrs = dict(values.attrs) | labels | {f"{d}_unit": unit for d, unit in own.items()}
             part.attrs |= {"quantity": str(quantity), "whole_dimensions": " ".join(map(str, values.dims))}
             if RULE in values.attrs:
-                part.attrs["units"] = unit_by_rule(values.attrs[RULE], own)
+                part.attrs["units"] = unit_by_rule(values.attrs[RULE], own | dict(words or {}))
             meaning = values.attrs.get("long_name", str(quantity))
             part.attrs["long_name"] = f"{meaning}: {', '.join(labels.values())}"
             _add(variables, f"{'_'.join(labels.values())}_{quantity}", part)
-    kept = {name: c.variable for name, c in dataset.coords.items() if not set(c.dims) & set(units)}
+    gone = {d for d in units if not any(d in v.dims for v in variables.values())}
+    kept = {name: c.variable for name, c in dataset.coords.items() if not set(c.dims) & gone}
     return xr.Dataset(variables, kept, dataset.attrs)
 
 

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-import xarray as xr
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
@@ -68,7 +67,7 @@ def wind_figure(comparison: WindComparison, title: str) -> Figure:
         mean = first["mean"].sel(response=BENDING, source="wind")
         mean_at_peak = float(mean[int(np.argmax(larger_sides(first, "wind").sel(response=BENDING).values))])
         for k, (name, statistics) in enumerate(comparison.statistics.items()):
-            part: xr.Dataset = statistics.sel(response=BENDING, source="wind")
+            part = statistics.sel(response=BENDING, source="wind")
             style = {"color": f"C{k}", "lw": 2.4 if k == 0 else 1.4}
             toward = part["mean"] + sign(mean_at_peak) * SIGMAS * part["std"]
             axes.plot(part["time"], factor * toward, label=name, **style)

@@ -20,6 +20,7 @@ from scipy.sparse import csc_array
 
 from ...model.tables import ORDER, Table, TableGroup
 from ...model.vehicle.vehicle import Vehicle
+from ..present.netcdf import RULE
 from .pair import AdjointPair
 from .start import StartShare
 from .tables import Parts, TotalDensity
@@ -85,13 +86,18 @@ def knot_sensitivities(
         by_table |= dict(zip(of, flat @ _row_cubics(*shape), strict=True))
     values = np.concatenate([table.values for table in rows.values()])
     derivatives = np.concatenate([by_table[name] for name in rows])
-    explained = {"long_name": "derivative with respect to one row, response unit per table unit"}
-    variables = {"knot_value": ("knot", values), "knot_derivative": ("knot", derivatives, explained)}
+    explained = {RULE: "quantity knot^-1", "long_name": "derivative with respect to one row"}
+    of_value = {RULE: "knot", "long_name": "value of a row"}
+    variables = {"knot_value": ("knot", values, of_value), "knot_derivative": ("knot", derivatives, explained)}
     if value is not None:
         relative = {"units": "1", "long_name": "percent per percent of the knot's value"}
         variables["knot_elasticity"] = ("knot", derivatives * values / value, relative)
+    counts = [table.values.size for table in rows.values()]
+    argument = {name: "s" if group.argument == "time" else "m" for group in groups for name in group.names}
     return variables, {
-        "knot_table": ("knot", np.repeat(list(rows), [table.values.size for table in rows.values()])),
+        "knot_table": ("knot", np.repeat(list(rows), counts)),
+        "knot_unit": ("knot", np.repeat([table.unit for table in rows.values()], counts)),
+        "knot_argument_unit": ("knot", np.repeat([argument[name] for name in rows], counts)),
         "knot_argument": (
             "knot",
             np.concatenate([table.argument for table in rows.values()]),

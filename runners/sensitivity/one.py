@@ -12,6 +12,7 @@ import xarray as xr
 from ...model.errors import AscentwindWarning, SwitchError
 from ...model.system.linear_system import COMBINED, LinearSystem
 from ..case.provenance import provenance
+from ..present.netcdf import RULE
 from ..solvers.stability import warn_if_unstable
 from .gradient import Gradient, gradient_of
 from .knots import knot_sensitivities
@@ -97,9 +98,9 @@ def refuse_undefined(system: LinearSystem, gradient: Gradient, rows: Iterable[in
 def _parameter_sensitivities(case: Case, gradient: Gradient, rows: list[int], value: float | None) -> Parts:
     parameters = [case.system.parameters[i] for i in rows]
     numbers, derivative = case.executable.parameters[rows], gradient.parameters[rows]
-    label = {"long_name": "derivative, response unit per parameter unit"}
+    label = {RULE: "quantity parameter^-1", "long_name": "derivative"}
     variables: dict[str, tuple] = {
-        "parameter_value": ("parameter", numbers, {"long_name": "present value"}),
+        "parameter_value": ("parameter", numbers, {RULE: "parameter", "long_name": "present value"}),
         "derivative": ("parameter", derivative, label),
     }
     if value is not None:

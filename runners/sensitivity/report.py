@@ -11,8 +11,10 @@ from rich.console import Console
 from rich.table import Table
 
 from ..present.files import write_whole
+from ..present.netcdf import write_netcdf
 from ..present.style import write_figure
 from .figures import altitude_figure, heading, largest, time_figure, tornado_figure
+from .layout import stored_layout
 
 SHOWN = 15
 
@@ -43,7 +45,7 @@ def write_sensitivity(found: xr.Dataset, folder: Path) -> list[Path]:
     """Write sensitivity.nc, sensitivity.csv (one row a parameter, table and table row) and the figures."""
     text = sensitivity_csv(found)
     written = [
-        write_whole(folder / "sensitivity.nc", lambda p: found.to_netcdf(p, engine="scipy")),
+        write_netcdf(stored_layout(found), folder / "sensitivity.nc"),
         write_whole(folder / "sensitivity.csv", lambda p: p.write_text(text, encoding="utf-8")),
         *write_figure(tornado_figure(found), folder, "sensitivity_tornado"),
     ]

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...model.tables import TableGroup
+from ..present.netcdf import RULE
 from ..solvers.collocation_grid import tables_at
 from .gradient import Gradient
 from .pair import AdjointPair
@@ -61,14 +62,14 @@ def table_sensitivities(
     units = [u for g in groups for u in g.units]
     columns = [names.index(n) for g in groups if g.name != "mean" for n in g.names]
     values, values_at_end, weights = pair.tables, pair.tables_at_end, pair.weights
-    per_second = "derivative with respect to the table's value at a time, response unit per table unit and second"
+    per_second = {RULE: "quantity table^-1 s^-1", "long_name": "derivative with respect to the table's value at a time"}
     variables: dict[str, tuple] = {
-        "table_value": (("table", "t"), values[:, columns].T),
-        "table_derivative": (("table", "t"), total.along[:, columns].T, {"long_name": per_second}),
+        "table_value": (("table", "t"), values[:, columns].T, {RULE: "table", "long_name": "value at a time"}),
+        "table_derivative": (("table", "t"), total.along[:, columns].T, per_second),
         "table_derivative_at_end": (
             "table",
             total.at_end[columns],
-            {"long_name": "weight of the delta at t2, response unit per table unit"},
+            {RULE: "quantity table^-1", "long_name": "weight of the delta at t2"},
         ),
         "node_weight": ("t", weights, {"units": "s", "long_name": "quadrature weight of a time"}),
     }

@@ -41,6 +41,8 @@ def whole(statistics: xr.Dataset) -> xr.Dataset:
     grown = statistics.expand_dims(chosen)
     if "response" in chosen:  # its unit goes with it
         grown = grown.assign_coords(unit=("response", [str(statistics["unit"].item())]))
+    if "other_response" in grown.dims:
+        grown = grown.sel(other_response=grown["response"].values)
     return grown.transpose(*(d for d in order if d in grown.dims), ...) if chosen else grown
 
 

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 
 from ...model.errors import UnknownNameError
 from ..case.case import Case
+from ..case.provenance import provenance
 from ..present.style import STYLE, words
 from ..solvers.planar_mean import RESPONSES, planar_mean
 
@@ -58,6 +59,7 @@ def mean_comparison(study: Case) -> xr.Dataset:
             "time": ("time", planar.times, {"units": "s", "long_name": "flight time"}),
             "response": list(RESPONSES),
         },
+        provenance(study),
     )
 
 

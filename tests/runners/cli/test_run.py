@@ -72,7 +72,9 @@ def test_sensitivity_ranks_and_writes(ascentwind, tmp_path, as504):
     assert stored == pytest.approx(e.to_dict(), rel=1e-8)
     assert {row[0] for row in rows[1:]} == {"parameter", "table", "row", "kilometre"}
     with xr.open_dataset(tmp_path / "found" / "sensitivity.nc", engine="scipy") as dataset:
-        np.testing.assert_allclose(dataset["knot_derivative"], expected["knot_derivative"], rtol=1e-9, atol=1e-12)
+        mass = expected.isel(knot=expected["knot_table"].values == "mass")
+        np.testing.assert_allclose(dataset["mass_knot_derivative"], mass["knot_derivative"], rtol=1e-9, atol=1e-12)
+        assert dataset["mass_knot_derivative"].attrs["units"] == "N m kg^-1"
         assert dataset.attrs["t2_s"] == 40.0
     for name in ("tornado", "over_time", "over_altitude"):
         assert (tmp_path / "found" / f"sensitivity_{name}.png").read_bytes().startswith(b"\x89PNG")
