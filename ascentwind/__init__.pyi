@@ -5,7 +5,11 @@ from .model.vehicle.reader import load_vehicle as load_vehicle
 from .runners.construct.build_vehicle import build_vehicle as build_vehicle
 from .runners.design.design import design as design
 from .runners.parameter_study.run import run_parameter_study as run_parameter_study
+from .runners.statistics.covariance import CovarianceEquation as CovarianceEquation
+from .runners.statistics.cvodes import Cvodes as Cvodes
+from .runners.statistics.ensemble import Ensemble as Ensemble
 from .runners.statistics.results import ResponseStatistics as ResponseStatistics
+from .runners.statistics.sweep import Sweep as Sweep
 from .runners.study import Study as Study
 from .runners.wind.synthesis.synthesise import synthesise as synthesise
 from .version import __version__ as __version__

@@ -8,6 +8,7 @@ from .codegen.toolchain.library import NoCompilerError as NoCompilerError
 from .model.errors import AscentwindError as AscentwindError
 from .model.errors import AscentwindWarning as AscentwindWarning
 from .model.errors import DataError as DataError
+from .model.errors import DeprecatedNameWarning as DeprecatedNameWarning
 from .model.errors import DirectNoiseError as DirectNoiseError
 from .model.errors import ExtrapolationWarning as ExtrapolationWarning
 from .model.errors import IntegrationError as IntegrationError
@@ -40,11 +41,11 @@ from .runners.sensitivity.request import NotAParameterError as NotAParameterErro
 from .runners.sensitivity.request import StructuralParameterError as StructuralParameterError
 from .runners.sensitivity.request import TableParameterError as TableParameterError
 from .runners.sensitivity.request import ZeroQuantityError as ZeroQuantityError
-from .runners.solvers.ensemble import EnsembleOptionsError as EnsembleOptionsError
 from .runners.solvers.least_squares import FitError as FitError
 from .runners.solvers.least_squares import StalledFitWarning as StalledFitWarning
 from .runners.solvers.sweep import BatchError as BatchError
 from .runners.statistics.engines import UncheckedStatisticsWarning as UncheckedStatisticsWarning
+from .runners.statistics.ensemble import EnsembleOptionsError as EnsembleOptionsError
 from .runners.views.equation_latex import MissingSymPyError as MissingSymPyError
 from .runners.wind.synthesis.result import SynthesisError as SynthesisError
 from .runners.wind.synthesis.synthesise import SlowFilterWarning as SlowFilterWarning

@@ -20,7 +20,7 @@ import numpy as np
 from ascentwind.codegen.system.executable import executable_system
 from ascentwind.codegen.system.functions import core_functions
 from ascentwind.codegen.system.source import c_source
-from ascentwind.runners import IntegratorOptions, Study
+from ascentwind.runners import Cvodes, Study
 from ascentwind.runners.solvers.adjoint import AdjointSolver
 
 END_TIME, ROUNDS = 75.0, 7
@@ -34,7 +34,7 @@ def seconds(call) -> float:
 
 def engines() -> None:
     compiled, interpreted = Study.load("as504"), Study.load("as504", compile=False)
-    tight = AdjointSolver(compiled.with_means, IntegratorOptions(relative_tolerance=1e-11)).run(END_TIME).variance
+    tight = AdjointSolver(compiled.with_means, Cvodes(relative_tolerance=1e-11)).run(END_TIME).variance
     solvers = {}
     for label, study, method, iteration, tolerance in (
         ("compiled, Adams, Newton, 1e-6", compiled, "adams", "newton", 1e-6),
@@ -46,7 +46,7 @@ def engines() -> None:
         ("interpreted, BDF, Newton, 1e-6", interpreted, "bdf", "newton", 1e-6),
         ("interpreted, Adams, Newton, 1e-6", interpreted, "adams", "newton", 1e-6),
     ):
-        options = IntegratorOptions(method=method, iteration=iteration, relative_tolerance=tolerance)
+        options = Cvodes(method=method, iteration=iteration, relative_tolerance=tolerance)
         solvers[label] = AdjointSolver(study.with_means, options)
         solvers[label].run(END_TIME)
     times = {label: [] for label in solvers}

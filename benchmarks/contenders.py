@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from importlib.util import find_spec
 
 import casadi as ca
@@ -12,10 +12,10 @@ from numpy_ensembles import Scheme, ensemble, euler_maruyama, fourth_order
 from scipy.integrate import solve_ivp
 
 from ascentwind.codegen.system.functions import state_scales
-from ascentwind.runners import EnsembleOptions, IntegratorOptions, Study
+from ascentwind.runners import Cvodes, Ensemble, Study, Sweep
 from ascentwind.runners.solvers.covariance import covariance_equation
 from ascentwind.runners.solvers.time_nodes import intervals
-from ascentwind.runners.statistics.engines import ENGINES
+from ascentwind.runners.statistics.engine import Engine
 
 FLIGHTS = 4  # simulated one by one; 500 take 125 times as long
 ENSEMBLE_STEP = 0.02  # s; the fastest root, near 100 rad/s, allows 0.028 s to a fourth-order formula
@@ -96,8 +96,8 @@ def contenders(study: Study) -> tuple[list[Contender], list[str]]:
     found, missing = [], []
     for method, label in (("adams", "Adams"), ("bdf", "BDF")):
         for tolerance in (1e-5, 1e-7, 1e-9):
-            options = IntegratorOptions(method=method, relative_tolerance=tolerance)
-            found.append(Contender(f"CVODES {label}", f"{tolerance:g}", _engine(study, "cvodes", options), True))
+            engine = Cvodes(method=method, relative_tolerance=tolerance)
+            found.append(Contender(f"CVODES {label}", f"{tolerance:g}", _engine(study, engine), True))
     for step in (0.02, 0.01, 0.005):
         found.append(Contender("CasADi rk, compiled rhs", f"{1e3 * step:g} ms", _casadi_rk(study, step), True))
     for tolerance in (1e-5, 1e-8):
@@ -133,21 +133,17 @@ def contenders(study: Study) -> tuple[list[Contender], list[str]]:
             _numpy_ensemble(study, euler, 500), False, part=EULER_SECONDS,
         )
     )  # fmt: skip
-    found.append(
-        Contender("ensemble of 500, compiled", "50 ms", _engine(study, "ensemble", EnsembleOptions(runs=500)), False)
-    )
-    if "sweep" in ENGINES:
-        for tolerance in (1e-4, 1e-6, 1e-8):
-            options = replace(ENGINES["sweep"].options(), relative_tolerance=tolerance)
-            found.append(Contender("sweep", f"{tolerance:g}", _engine(study, "sweep", options), False))
+    found.append(Contender("ensemble of 500, compiled", "50 ms", _engine(study, Ensemble(runs=500)), False))
+    for tolerance in (1e-4, 1e-6, 1e-8):
+        found.append(Contender("sweep", f"{tolerance:g}", _engine(study, Sweep(tolerance)), False))
     return found, missing
 
 
-def _engine(study: Study, name: str, options: object) -> Callable[[np.ndarray], np.ndarray]:
-    compute, names = ENGINES[name].compute, list(study.system.output_names)
+def _engine(study: Study, engine: Engine) -> Callable[[np.ndarray], np.ndarray]:
+    names = list(study.system.output_names)
 
     def run(times: np.ndarray) -> np.ndarray:
-        return compute(study, times.tolist(), names, options, None).std.values[:, :, :-1]
+        return engine.compute(study, times.tolist(), names)["std"].values[:, :, :-1]
 
     return run
 

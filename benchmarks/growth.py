@@ -11,9 +11,9 @@ import numpy as np
 from ascentwind.codegen.ensemble.compiled import ensemble_of
 from ascentwind.codegen.sweep.compiled import sweep_of
 from ascentwind.model import LinearSystem, define_system
-from ascentwind.runners import CovarianceOptions, EnsembleOptions, IntegratorOptions, Study
+from ascentwind.runners import CovarianceEquation, Cvodes, Ensemble, Study
 from ascentwind.runners.solvers.sweep import batch, sweep
-from ascentwind.runners.statistics.engines import ENGINES
+from ascentwind.runners.statistics.engine import Engine
 
 BUDGET = 8.0  # s; what is foreseen to take longer is left out
 SIZES = (10, 20, 40, 80)
@@ -40,10 +40,10 @@ def growth(study: Study) -> dict[str, Rows]:
     """Return seconds by engine for growing problems."""
     names = list(study.system.output_names)
 
-    def on_as504(engine: str, options: object) -> Callable[[int], None]:
+    def on_as504(engine: Engine) -> Callable[[int], None]:
         def run(count: int) -> None:
             times = np.linspace(study.system.start, 140.0, count + 1)[1:].tolist()
-            ENGINES[engine].compute(study, times, names, options, None)
+            engine.compute(study, times, names)
 
         return run
 
@@ -58,7 +58,7 @@ def growth(study: Study) -> dict[str, Rows]:
     def one_by_one(count: int) -> None:
         for k in range(count):
             changed = study.with_parameters({"wind.sigma_scale": 1 + 0.001 * k})
-            ENGINES["cvodes"].compute(changed, [75.0], names, IntegratorOptions(relative_tolerance=1e-5), None)
+            Cvodes(relative_tolerance=1e-5).compute(changed, [75.0], names)
 
     # compiled beforehand: growth is of the run
     chains = {states: Study.from_system(chain(states)) for states in SIZES}
@@ -66,24 +66,24 @@ def growth(study: Study) -> dict[str, Rows]:
     for found in chains.values():
         ensemble_of(found.executable)
 
-    def on_chain(engine: str, options: object) -> Callable[[int], None]:
+    def on_chain(engine: Engine) -> Callable[[int], None]:
         def run(states: int) -> None:
-            ENGINES[engine].compute(chains[states], [5.0, 10.0, 15.0, 20.0], ["first", "second"], options, None)
+            engine.compute(chains[states], [5.0, 10.0, 15.0, 20.0], ["first", "second"])
 
         return run
 
     def sweep_chain(states: int) -> None:
         sweep(sweeps[states], chains[states].executable, [5.0, 10.0, 15.0, 20.0])
 
-    tight = IntegratorOptions(relative_tolerance=1e-7)
+    tight = Cvodes(relative_tolerance=1e-7)
     rows: dict[str, Rows] = {
         "states (chain of oscillators, 4 end times)": [
             (label, _measure(run, SIZES))
             for label, run in (
                 ("sweep", sweep_chain),
-                ("CVODES Adams, an end time", on_chain("cvodes", tight)),
-                ("covariance equation, SciPy", on_chain("covariance", CovarianceOptions(1e-8))),
-                ("ensemble of 500, compiled", on_chain("ensemble", EnsembleOptions())),
+                ("CVODES Adams, an end time", on_chain(tight)),
+                ("covariance equation, SciPy", on_chain(CovarianceEquation(1e-8))),
+                ("ensemble of 500, compiled", on_chain(Ensemble())),
             )
         ],
         "end times (AS-504, 10 to 140 s)": [
@@ -94,10 +94,10 @@ def growth(study: Study) -> dict[str, Rows]:
                     lambda count: sweep(member, study.with_means, np.linspace(10.0, 140.0, count + 1)[1:]),
                     BUDGET,
                 ),
-                ("CVODES Adams, an end time", on_as504("cvodes", tight), BUDGET),
+                ("CVODES Adams, an end time", on_as504(tight), BUDGET),
                 # one pass over the flight: ten times as many end times take far less than ten times as long
-                ("covariance equation, SciPy", on_as504("covariance", CovarianceOptions(1e-8)), 10 * BUDGET),
-                ("ensemble of 500, compiled", on_as504("ensemble", EnsembleOptions()), 10 * BUDGET),
+                ("covariance equation, SciPy", on_as504(CovarianceEquation(1e-8)), 10 * BUDGET),
+                ("ensemble of 500, compiled", on_as504(Ensemble()), 10 * BUDGET),
             )
         ],
         "parameter sets (AS-504)": [

@@ -195,6 +195,10 @@ class AscentwindWarning(UserWarning):
     """Base of every warning that ascentwind gives."""
 
 
+class DeprecatedNameWarning(AscentwindWarning):
+    """A name that goes with the next release was used; its successor is named."""
+
+
 class UnstableSystemWarning(AscentwindWarning):
     """The closed loop, frozen at some time, has a root in the right half plane."""
 

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from ..codegen.sweep.compiled import sweep_of
-from ..model.errors import ParameterValueError
+from ..model.errors import IntegrationError, ParameterValueError
 from ..model.system.linear_system import COMBINED
 from .case.case import Case
 from .case.times import end_times
@@ -19,13 +19,14 @@ from .sensitivity.many import sensitivities
 from .sensitivity.one import sensitivity
 from .sensitivity.second import second_derivatives
 from .solvers.adjoint import AdjointSolver
-from .solvers.integration import IntegratorOptions
 from .solvers.mean_response import with_mean_tables
-from .solvers.stability import warn_if_unstable
-from .solvers.sweep import SweepOptions, batch, sweep
-from .statistics.dataset import with_members
-from .statistics.engines import Progress, batch_dataset, compute_statistics
+from .solvers.sweep import batch, sweep
+from .statistics.cvodes import Cvodes
+from .statistics.dataset import batch_dataset, with_members
+from .statistics.engine import Engine, Progress
+from .statistics.engines import engine_as, engine_of_options, find_engine, response_statistics
 from .statistics.results import ResponseStatistics
+from .statistics.sweep import Sweep
 from .statistics.weighting import weighting_dataset, weighting_family
 
 
@@ -59,8 +60,8 @@ class Study(Case):
         times: Iterable[float],
         *,
         responses: Iterable[str] | None = None,
-        engine: str | None = None,
-        options: object | None = None,
+        engine: str | Engine | None = None,
+        options: Engine | None = None,
         check: bool = False,
         progress: Progress | None = None,
     ) -> ResponseStatistics:
@@ -73,12 +74,13 @@ class Study(Case):
         responses : iterable of str, optional
             All without it. White noise that reaches a response directly makes its variance infinite; leave that
             response out or colour the noise.
-        engine : str, optional
-            'sweep' (default where a compiler is found): all end times in one pass of a generated integrator.
-            'cvodes' (default elsewhere): one backward adjoint run an end time. 'covariance': the covariance
-            equation, forward. 'ensemble': simulated flights, with confidence intervals.
-        options : SweepOptions, IntegratorOptions, CovarianceOptions or EnsembleOptions, optional
-            As the engine takes; alone they choose it.
+        engine : str or Engine, optional
+            :class:`~ascentwind.Sweep`, 'sweep' (default where a compiler is found): all end times in one pass of a
+            generated integrator. :class:`~ascentwind.Cvodes`, 'cvodes' (default elsewhere): one backward adjoint run an
+            end time. :class:`~ascentwind.CovarianceEquation`, 'covariance': forward. :class:`~ascentwind.Ensemble`,
+            'ensemble': simulated flights, with confidence intervals. By name each has its defaults.
+        options : Engine, optional
+            The former name of ``engine``; goes with the next release.
         check : bool
             Compute everything a second time with a finer discretisation (a tenth of the tolerance or less, half the
             substep of the ensemble), in each of 1024 pieces of the flight so that no step passes over a pulse, and keep
@@ -97,23 +99,27 @@ class Study(Case):
 
         Warns
         -----
-        UnstableSystemWarning
+        UnstableSystemWarning, UncheckedStatisticsWarning
         """
-        times = end_times(times)
-        self.checked_times(times)
-        wanted = self.checked_responses(responses)
-        warn_if_unstable(self.executable, times[-1])
-        return compute_statistics(self, times, wanted, engine, options, check, progress)
+        return response_statistics(
+            self,
+            times,
+            responses=responses,
+            engine=engine_of_options(engine, options),
+            check=check,
+            progress=progress,
+        )
 
     def batch(
         self,
         parameter_sets: Sequence[Mapping[str, float]],
         times: Iterable[float],
         *,
-        options: SweepOptions | None = None,
+        engine: str | Engine | None = None,
+        options: Engine | None = None,
         threads: int | None = None,
     ) -> ResponseStatistics:
-        """Return the statistics for many sets of parameter values by the sweep, on all cores.
+        """Return the statistics for many sets of parameter values, by the sweep on all cores.
 
         Where nothing is compiled, CVODES computes one set after another.
 
@@ -123,10 +129,12 @@ class Study(Case):
             Each as for :meth:`with_parameters`.
         times : iterable of float
             End times t2, s.
-        options : SweepOptions, optional
-            Relative tolerance 1e-4 without it; names the sweep, which needs a compiler.
+        engine : Sweep, Cvodes or their names, optional
+            The sweep at a relative tolerance of 1e-4 without it or by its name.
+        options : Sweep, optional
+            The former name of ``engine``; goes with the next release.
         threads : int, optional
-            All cores without it; names the sweep too.
+            All cores without it; names the sweep, which needs a compiler.
 
         Returns
         -------
@@ -141,35 +149,47 @@ class Study(Case):
         if not parameter_sets:
             raise ParameterValueError("a batch needs at least one set of parameter values")
         self.require_linear_mean("a batch")
-        ends = end_times(times)
-        self.checked_times(ends)
+        ends = self.checked_times(end_times(times))
         self.checked_responses(None)
         values = [self.numbers(changes) for changes in parameter_sets]
-        if self.executable.shared_library is None and options is None and threads is None:
-            by_cvodes = IntegratorOptions()
+        engine = engine_of_options(engine, options)
+        if engine is None:
+            alone = self.executable.shared_library is None and threads is None
+            engine = Cvodes() if alone else Sweep(relative_tolerance=1e-4)
+        elif engine == Sweep.name:
+            engine = Sweep(relative_tolerance=1e-4)
+        chosen = find_engine(engine)
+        if isinstance(chosen, Cvodes):
+            if threads is not None:
+                raise IntegrationError("CVODES computes one set after another; leave 'threads' out, or take the sweep")
             members = []
             for numbers in values:
                 member = with_mean_tables(self.executable.with_numbers(parameters=numbers))
-                solver = AdjointSolver(member, by_cvodes)
+                solver = AdjointSolver(member, chosen)
                 runs = [solver.run(time) for time in ends]
                 members.append((np.array([run.mean for run in runs]), np.array([run.variance for run in runs])))
-            found = batch_dataset(self, ends, members, "cvodes", by_cvodes.relative_tolerance)
-            return ResponseStatistics(with_members(found, self, parameter_sets))
-        options = options or SweepOptions(relative_tolerance=1e-4)
-        found = batch(
-            sweep_of(self.executable),
-            self.executable,
-            values,
-            ends,
-            relative_tolerance=options.relative_tolerance,
-            threads=threads,
-        )
-        members = [(member.mean, member.variance) for member in found]
-        dataset = batch_dataset(self, ends, members, "sweep", options.relative_tolerance)
+        elif isinstance(chosen, Sweep):
+            found = batch(
+                sweep_of(self.executable),
+                self.executable,
+                values,
+                ends,
+                relative_tolerance=chosen.relative_tolerance,
+                threads=threads,
+            )
+            members = [(member.mean, member.variance) for member in found]
+        else:
+            raise IntegrationError(f"a batch is computed by Sweep or Cvodes, not by {type(chosen).__name__}")
+        dataset = batch_dataset(self, ends, members, chosen.name, chosen.relative_tolerance)
         return ResponseStatistics(with_members(dataset, self, parameter_sets))
 
     def weighting_functions(
-        self, times: Iterable[float], *, spacing: float = 0.25, options: SweepOptions | None = None
+        self,
+        times: Iterable[float],
+        *,
+        spacing: float = 0.25,
+        engine: str | Sweep | None = None,
+        options: Sweep | None = None,
     ) -> xr.Dataset:
         """Return the weighting functions g(t2, t) of all responses for many end times, by one backward sweep.
 
@@ -179,7 +199,9 @@ class Study(Case):
             End times t2, s.
         spacing : float
             Largest distance between points, s.
-        options : SweepOptions, optional
+        engine : Sweep or its name, optional
+        options : Sweep, optional
+            The former name of ``engine``; goes with the next release.
 
         Returns
         -------
@@ -190,22 +212,27 @@ class Study(Case):
         ------
         TimeRangeError, IntegrationError, NoCompilerError
         """
-        ends = end_times(times)
-        self.checked_times(ends)
+        ends = self.checked_times(end_times(times))
         self.check_spacing(spacing)
-        tolerance = (options or SweepOptions()).relative_tolerance
+        what = "weighting functions of many end times are computed"
+        chosen = engine_as(Sweep, engine_of_options(engine, options), Sweep(), what)
         found = sweep(
             sweep_of(self.executable),
             self.with_means,
             ends,
-            relative_tolerance=tolerance,
+            relative_tolerance=chosen.relative_tolerance,
             weighting_spacing=spacing,
             responses=(),
         )
         return weighting_family(self, found)
 
     def weighting_function(
-        self, time: float, *, spacing: float = 0.05, options: IntegratorOptions | None = None
+        self,
+        time: float,
+        *,
+        spacing: float = 0.05,
+        engine: str | Cvodes | None = None,
+        options: Cvodes | None = None,
     ) -> xr.Dataset:
         """Return the weighting functions g(t2, t) of all responses for t2 = ``time``.
 
@@ -215,7 +242,9 @@ class Study(Case):
             t2, s.
         spacing : float
             Largest distance between points, s.
-        options : IntegratorOptions, optional
+        engine : Cvodes or its name, optional
+        options : Cvodes, optional
+            The former name of ``engine``; goes with the next release.
 
         Returns
         -------
@@ -230,7 +259,9 @@ class Study(Case):
         """
         self.checked_times([time])
         self.check_spacing(spacing)
-        history = AdjointSolver(self.with_means, options or IntegratorOptions()).history(float(time), spacing)
+        what = "the weighting functions of one end time are computed"
+        chosen = engine_as(Cvodes, engine_of_options(engine, options), Cvodes(), what)
+        history = AdjointSolver(self.with_means, chosen).history(float(time), spacing)
         return weighting_dataset(self, float(time), history)
 
     def sensitivity(

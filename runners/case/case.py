@@ -1,4 +1,4 @@
-"""What a study holds: a vehicle or system with its numbers, and what follows from them at one time."""
+"""A vehicle or system with its numbers, and what follows from them at one time."""
 
 from __future__ import annotations
 
@@ -36,7 +36,9 @@ POSITIVE = ("correlation_time", "reference_area")
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Case:
-    """A system with numbers; :class:`~ascentwind.runners.Study` asks the questions.
+    """A system with its numbers and its vehicle: all that an analysis is given.
+
+    :class:`~ascentwind.runners.study.Study` is one, and asks the questions.
 
     Attributes
     ----------
@@ -330,18 +332,23 @@ class Case:
         if not spacing > 0:
             raise TimeRangeError(f"a spacing of {spacing:g} s is not positive")
 
-    def checked_times(self, times: list[float]) -> None:
-        """Raise if one of the end times does not lie on the flight, or there are none.
+    def checked_times(self, times: Iterable[float]) -> list[float]:
+        """Return end times as they are given; raise if one does not lie on the flight, or there are none.
 
         Parameters
         ----------
-        times : list of float
+        times : iterable of float
             s.
+
+        Returns
+        -------
+        list of float
 
         Raises
         ------
         TimeRangeError
         """
+        times = list(times)
         if not times:
             raise TimeRangeError("no end time was given")
         for time in times:
@@ -355,6 +362,7 @@ class Case:
                     "choose a later one or an earlier start_time_s"
                 )
             raise TimeRangeError(f"end time {time:g} s lies beyond {self._end_of_data()}")
+        return times
 
     def _end_of_data(self) -> str:
         end = f"the end of the system at {self.system.end:g} s"

@@ -29,17 +29,17 @@ def verify(
     """The same statistics by independent engines, with a verdict; exit code 1 when they disagree."""
     from ..case.times import parse_times, spread_over
     from ..present.style import write_figure
-    from ..solvers.ensemble import EnsembleOptions
+    from ..statistics.ensemble import Ensemble
     from ..statistics.figures import sample_path_figure
     from ..statistics.verify import verify as run_verification
 
-    options = EnsembleOptions(runs=runs, seed=seed, paths=min(30, runs) if out else 0)
+    ensemble = Ensemble(runs=runs, seed=seed, paths=min(30, runs) if out else 0)
     study = load_study(vehicle, changes, [] if times else ["default_times"])
     job = Job(out) if out else None
     assert study.vehicle is not None
     end_times = parse_times(times) if times else spread_over(parse_times(study.vehicle.file.default_times), 4)
     with console.status("computing with every engine"):
-        found = run_verification(study, end_times, options)
+        found = run_verification(study, end_times, ensemble)
     _print_verification(found)
     if job:
         with console.status("drawing sample paths"):

@@ -40,19 +40,19 @@ def run(
     """
     from ..case.times import parse_times
     from ..present.style import words, write_figure
-    from ..statistics.engines import engine_options
+    from ..statistics.engines import engine_from
     from ..statistics.figures import weighting_figure
     from ..statistics.larger_side import LABEL
     from ..statistics.peak_check import weighting_at, with_peak_check
     from ..views.along_vehicle_files import prepare_along_vehicle, write_along_vehicle
 
     settings = {"method": method, "relative_tolerance": tolerance}
-    engine_options(engine, **settings)  # refused before anything is computed
+    engine_from(engine, **settings)  # refused before anything is computed
     if times and "default_times" in parse_changes(changes or []):
         raise UnusedOptionError("--set default_times is not used with --times; leave one of them out")
     study = load_study(vehicle, changes, SHOWN)
     assert study.vehicle is not None
-    engine, options = engine_options(engine, compiled=study.executable.shared_library is not None, **settings)
+    chosen = engine_from(engine, compiled=study.executable.shared_library is not None, **settings)
     end_times = parse_times(times or study.vehicle.file.default_times)
     moment_time = None if along_vehicle is None else prepare_along_vehicle(study, along_vehicle)
     families = [t for t in study.vehicle.file.weighting_times_s if study.system.start < t <= study.system.end]
@@ -60,7 +60,7 @@ def run(
     job = Job(out or results_folder(vehicle, "results"))
     with steps("end times", len(end_times)) as bar:
         statistics = study.response_statistics(
-            end_times, engine=engine, options=options, progress=lambda t: bar.done(f"end time {t:g} s")
+            end_times, engine=chosen, progress=lambda t: bar.done(f"end time {t:g} s")
         )
     job.replace_earlier("run", study.system.name)
     job.written += statistics.save(job.folder)

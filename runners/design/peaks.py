@@ -15,8 +15,8 @@ from ...model.system.linear_system import COMBINED
 from ..sensitivity.gradient import gradient_of
 from ..sensitivity.pair import AdjointPair
 from ..solvers.flight_nodes import FlightNodes
-from ..solvers.sweep import SweepOptions
 from ..statistics.larger_side import SIGMAS
+from ..statistics.sweep import Sweep
 
 if TYPE_CHECKING:
     from ..study import Study
@@ -32,11 +32,11 @@ def three_sigma(study: Study, responses: list[str], times: tuple[float, ...]) ->
 
     The largest over both signs and all times is the peak of |mean| + 3 sigma.
     """
-    options = None if study.executable.shared_library is None else SweepOptions(TOLERANCE)
+    engine = None if study.executable.shared_library is None else Sweep(TOLERANCE)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UnstableSystemWarning)
         try:
-            found = study.response_statistics(times, responses=responses, options=options)
+            found = study.response_statistics(times, responses=responses, engine=engine)
         except IntegrationError:
             return None
     mean, std = (found[name].sel(source=COMBINED).values.T for name in ("mean", "std"))

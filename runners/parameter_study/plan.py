@@ -14,7 +14,8 @@ from ...model.errors import DataError, TimeRangeError
 from ...model.files.folder_files import FileName
 from ...model.files.toml_file import Section, Whole, read_toml, validated
 from ..case.times import parse_times
-from ..solvers.sweep import LARGEST_TOLERANCE, LEAST_TOLERANCE
+from ..solvers.sweep import LEAST_TOLERANCE
+from ..solvers.tolerances import LARGEST_TOLERANCE
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]

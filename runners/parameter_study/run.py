@@ -18,8 +18,8 @@ from ..case.provenance import provenance
 from ..case.times import parse_times
 from ..present.files import write_bytes
 from ..present.netcdf import RULE, one_unit_a_variable, with_conventions
-from ..solvers.sweep import SweepOptions
 from ..statistics.dataset import QUANTITIES
+from ..statistics.sweep import Sweep
 from ..study import Study
 from .cluster import compute_on_cluster
 from .compute import FAILED, STATUS, Chunk, ChunkResult, Task, chunks, compute_chunk
@@ -127,7 +127,7 @@ def _task(study: Study, plan: ParameterStudyPlan, quantities: tuple[Quantity, ..
         raise DataError("is missing; a system of your own has no default times", column="times")
     times = sorted(set(parse_times(text)))
     study.checked_times(times)
-    SweepOptions(plan.relative_tolerance)
+    Sweep(plan.relative_tolerance)
     known = (*study.system.sources, COMBINED)
     for source in plan.sources or ():
         if source not in known:

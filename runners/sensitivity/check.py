@@ -23,7 +23,7 @@ from ...model.vehicle.vehicle import Vehicle
 from ...model.wind.shaping_filter import ShapingFilter
 from ..case.wind_start import covariance_at
 from ..solvers.adjoint import AdjointSolver
-from ..solvers.integration import IntegratorOptions
+from ..solvers.integration import CvodesSettings
 from ..solvers.mean_response import mean_response, with_mean_tables
 from .gradient import gradient_of
 from .knots import vehicle_rows
@@ -141,7 +141,7 @@ def of_vehicle(executable: ExecutableSystem, vehicle: Vehicle) -> ExecutableSyst
 
 def _value(executable: ExecutableSystem, request: Request, time: float) -> float:
     filled = with_mean_tables(executable, partial(mean_response, relative_tolerance=TOLERANCE))
-    run = AdjointSolver(filled, IntegratorOptions(relative_tolerance=TOLERANCE)).run(time)
+    run = AdjointSolver(filled, CvodesSettings(relative_tolerance=TOLERANCE)).run(time)
     columns = [executable.system.sources.index(s) for s in request.sources]
     return request.value(float(run.variance[request.row, columns].sum()), float(run.mean[request.row]))
 

@@ -15,6 +15,7 @@ from scipy.optimize import root_scalar
 from ...model.errors import TimeRangeError
 from ..case.times import parse_times, seconds
 from ..solvers.time_nodes import beyond
+from ..statistics.engines import response_statistics
 from ..statistics.larger_side import sign
 
 if TYPE_CHECKING:
@@ -36,7 +37,7 @@ def peak_time(case: Case, request: Request) -> tuple[float, bool]:
         If the system has no end.
     """
     times = _range(case)
-    scan = case.response_statistics(times, responses=[request.response])
+    scan = response_statistics(case, times, responses=[request.response])
     mean, variance = (scan[name].sel(source=request.source).values[:, 0] for name in ("mean", "variance"))
     best = int(np.argmax([request.sought(float(v), float(m)) for v, m in zip(variance, mean, strict=True)]))
     low, high = times[max(best - 1, 0)], times[min(best + 1, len(times) - 1)]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ...codegen.system.executable import ExecutableSystem
 from ...codegen.system.functions import state_scales
 from ...model.errors import IntegrationError, StepBudgetError
-from .integration import Counters, Integrator, IntegratorOptions
+from .integration import Counters, CvodesSettings, Integrator
 from .step_budget import naming_fastest_root
 from .time_nodes import Interval, interval_before, intervals, time_nodes
 from .typical_sizes import TypicalSizes, typical_sizes
@@ -70,7 +70,7 @@ class AdjointHistory:
 class AdjointSolver:
     """Runs the adjoint of a system backward with CVODES."""
 
-    def __init__(self, executable: ExecutableSystem, options: IntegratorOptions):
+    def __init__(self, executable: ExecutableSystem, options: CvodesSettings):
         self._executable, self._options = executable, options
         self._integrator = Integrator(executable.functions.adjoint, options)
         few = replace(options, max_steps=min(options.max_steps, FEW_STEPS))

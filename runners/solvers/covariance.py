@@ -25,35 +25,6 @@ LARGEST = 1e280  # of scaled covariances and means
 MOST_STEPS = 100_000  # AS-504 takes 32,000 steps of DOP853 at a tolerance of 1e-13
 
 
-@dataclass(frozen=True)
-class CovarianceOptions:
-    """How the covariance equation is integrated.
-
-    Parameters
-    ----------
-    relative_tolerance : float
-        Of every covariance, between 1e-13 and 1e-2.
-    absolute_part : float
-        The absolute tolerance as a part of the relative one, of the sizes that each source gives the states
-        (runners/solvers/typical_sizes.py): one that hardly moves the vehicle gives covariances many orders smaller
-        than the wind's.
-    longest_interval : float
-        Intervals between discontinuities are divided so that none is longer, s.
-    """
-
-    relative_tolerance: float = 1e-9
-    absolute_part: float = 1e-4
-    longest_interval: float = float("inf")
-
-    def __post_init__(self):
-        if not 1e-13 <= self.relative_tolerance <= 1e-2:
-            raise IntegrationError(
-                f"a relative tolerance of {self.relative_tolerance:g} cannot be met; choose 1e-13 to 1e-2"
-            )
-        if not 0 < self.absolute_part <= 1:
-            raise IntegrationError(f"an absolute part of {self.absolute_part:g} makes no sense; choose up to 1")
-
-
 @dataclass(frozen=True, eq=False)
 class CovarianceResult:
     """Covariances (k, sources, responses, responses) and means (k, responses) at ``times``."""
@@ -84,8 +55,10 @@ def covariance_equation(
         With its tables of the mean response filled in.
     times : sequence of float
         Increasing, s.
-    relative_tolerance, absolute_part : float
-        As of :class:`CovarianceOptions`.
+    relative_tolerance : float
+        Of every covariance.
+    absolute_part : float
+        The absolute tolerance as a part of the relative one, of the sizes that each source gives the states.
     progress : callable, optional
         Called with each time when it is reached.
     longest_interval : float

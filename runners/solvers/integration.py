@@ -1,4 +1,4 @@
-"""CVODES through CasADi: options, counters, and errors with a time in them."""
+"""CVODES through CasADi: settings, counters, and errors with a time in them."""
 
 from __future__ import annotations
 
@@ -13,15 +13,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...model.errors import IntegrationError, StepBudgetError
+from .tolerances import check_absolute_part, check_relative_tolerance
 
 Method = Literal["adams", "bdf"]
 Iteration = Literal["newton", "functional"]
+LEAST_TOLERANCE = 1e-13
 LEAST_STEPS = 1000  # of CVODES from one output point to the next
 COUNTERS = ("nsteps", "nfevals", "nlinsetups", "netfails")
 
 
 @dataclass(frozen=True)
-class IntegratorOptions:
+class CvodesSettings:
     """How CVODES integrates.
 
     Parameters
@@ -32,7 +34,7 @@ class IntegratorOptions:
         functional iteration its step.
     iteration : {'newton', 'functional'}
     relative_tolerance : float
-        On every adjoint and quadrature, between 1e-13 and 1e-2.
+        Relative, on every adjoint and quadrature, between 1e-13 and 1e-2.
     absolute_part : float
         The absolute tolerance as a part of the relative one, of quantities scaled to be of the order of one
         (runners/solvers/typical_sizes.py).
@@ -54,14 +56,11 @@ class IntegratorOptions:
             raise IntegrationError(f"method '{self.method}' is not known; choose 'adams' or 'bdf'")
         if self.iteration not in ("newton", "functional"):
             raise IntegrationError(f"iteration '{self.iteration}' is not known; choose 'newton' or 'functional'")
-        if not 1e-13 <= self.relative_tolerance <= 1e-2:
-            raise IntegrationError(
-                f"a relative tolerance of {self.relative_tolerance:g} cannot be met; choose 1e-13 to 1e-2"
-            )
-        if not 0 < self.absolute_part <= 1:
-            raise IntegrationError(f"an absolute part of {self.absolute_part:g} makes no sense; choose up to 1")
+        check_relative_tolerance(self.relative_tolerance, LEAST_TOLERANCE)
+        check_absolute_part(self.absolute_part)
 
     def casadi_options(self) -> dict[str, Any]:
+        """Return the settings by CasADi's names."""
         return {
             "linear_multistep_method": self.method,
             "nonlinear_solver_iteration": self.iteration,
@@ -89,7 +88,7 @@ class Counters:
 class Integrator:
     """A CasADi CVODES integrator over pseudo-time 0 to 1, reused for every interval."""
 
-    def __init__(self, function: ca.Function, options: IntegratorOptions):
+    def __init__(self, function: ca.Function, options: CvodesSettings):
         self._function, self._options = function, options.casadi_options()
         self._by_count: dict[int, ca.Function] = {}
 

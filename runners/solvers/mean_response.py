@@ -15,7 +15,7 @@ from ...codegen.system.executable import ExecutableSystem
 from ...codegen.system.functions import state_scales
 from ...model.equations.vehicle_tables import MEAN_TABLES
 from ...model.tables import TableGroup
-from .integration import Integrator, IntegratorOptions
+from .integration import CvodesSettings, Integrator
 from .step_budget import naming_fastest_root
 from .time_nodes import intervals
 
@@ -57,7 +57,7 @@ def mean_response(
     """
     system = executable.system
     scale = state_scales(system)
-    integrator = Integrator(executable.functions.mean, IntegratorOptions(relative_tolerance=relative_tolerance))
+    integrator = Integrator(executable.functions.mean, CvodesSettings(relative_tolerance=relative_tolerance))
     states = [np.zeros(len(scale))]
     outputs: list[NDArray] = []
     response = executable.functions.response

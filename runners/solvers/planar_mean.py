@@ -14,7 +14,7 @@ from ...model.construction.planar_equations import PlanarLoop, planar_loop
 from ...model.equations.vehicle_tables import MEAN_TABLES, mean_knots
 from ...model.errors import DataError
 from ...model.vehicle.vehicle import Vehicle
-from .integration import Integrator, IntegratorOptions
+from .integration import CvodesSettings, Integrator
 from .mean_response import mean_splines
 from .time_nodes import intervals
 
@@ -64,7 +64,7 @@ def planar_mean(vehicle: Vehicle, executable: ExecutableSystem) -> PlanarMean:
     system, n = executable.system, loop.states.numel()
     scale = np.tile(np.concatenate([[1e3, 10.0], np.full(n - 2, 0.02)]), 2)
     flight = _rate(loop, executable, scale)
-    integrator = Integrator(flight.integrand, IntegratorOptions(relative_tolerance=TOLERANCE))
+    integrator = Integrator(flight.integrand, CvodesSettings(relative_tolerance=TOLERANCE))
     knots = mean_knots(system.start, system.end, system.discontinuities)
     start = flight.start(system.start).full().ravel()
     times, states, responses = [knots[:1]], [start[None]], [flight.outputs(system.start, start).full().T]

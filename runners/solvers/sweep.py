@@ -24,33 +24,11 @@ from .cores import available_cores
 from .mean_response import MeanResponse, with_mean_tables
 from .step_budget import naming_fastest_root
 from .time_nodes import Interval, intervals, on_flight, time_nodes
+from .tolerances import check_relative_tolerance
 from .typical_sizes import misjudged, sizes_of_sweep
 
 LONGEST_SEGMENT = 1.0  # s; weights of the error control are renewed and the Gramians stay well scaled
-LEAST_TOLERANCE, LARGEST_TOLERANCE = 1e-12, 1e-2
-
-
-@dataclass(frozen=True)
-class SweepOptions:
-    """How the sweep integrates.
-
-    Parameters
-    ----------
-    relative_tolerance : float
-        Of every standard deviation, between 1e-12 and 1e-2.
-    longest_interval : float
-        Flight is looked at in pieces no longer than this, s.
-    """
-
-    relative_tolerance: float = 1e-7
-    longest_interval: float = LONGEST_SEGMENT
-
-    def __post_init__(self):
-        if not LEAST_TOLERANCE <= self.relative_tolerance <= LARGEST_TOLERANCE:
-            raise IntegrationError(
-                f"a relative tolerance of {self.relative_tolerance:g} cannot be met; choose {LEAST_TOLERANCE:g} to "
-                f"{LARGEST_TOLERANCE:g}"
-            )
+LEAST_TOLERANCE = 1e-12
 
 
 def available_sweep(executable: ExecutableSystem) -> CompiledSweep | None:
@@ -173,7 +151,7 @@ def sweep(
     TimeRangeError, DirectNoiseError, IntegrationError, DataError
     """
     system, ends = engine.system, check_times(engine.system, times)
-    SweepOptions(relative_tolerance)
+    check_relative_tolerance(relative_tolerance, LEAST_TOLERANCE)
     system.refuse_direct_noise(system.output_names if responses is None else responses)
     longest = min(LONGEST_SEGMENT, longest_interval, weighting_spacing or LONGEST_SEGMENT)
     nodes = time_nodes(executable, ends)

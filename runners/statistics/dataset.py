@@ -11,8 +11,6 @@ import xarray as xr
 from ...model.system.linear_system import COMBINED
 from ..case.provenance import provenance
 from ..present.netcdf import RULE, unit_factors, written_unit
-from ..solvers.adjoint import AdjointRun
-from ..solvers.integration import COUNTERS, IntegratorOptions
 
 if TYPE_CHECKING:
     from ..case.case import Case
@@ -23,26 +21,6 @@ QUANTITIES = {
     "std": "standard deviation",
     "mean_plus_3sigma": "mean plus three standard deviations",
 }
-
-
-def response_dataset(
-    case: Case, runs: Sequence[AdjointRun], responses: Sequence[str], options: IntegratorOptions
-) -> xr.Dataset:
-    """Put adjoint runs together."""
-    rows = [case.system.output_index(name) for name in responses]
-    variance = np.array([run.variance[rows] for run in runs])
-    mean = np.array([run.mean[rows] for run in runs])
-    attributes = provenance(case) | {
-        "engine": "cvodes",
-        "code": case.executable.engine,
-        "method": options.method,
-        "iteration": options.iteration,
-        "relative_tolerance": options.relative_tolerance,
-    }
-    dataset = statistics_dataset(case, [run.time for run in runs], responses, mean, variance, attributes)
-    for name in COUNTERS:
-        dataset[name] = ("time", [run.counters[name] for run in runs])
-    return dataset
 
 
 def statistics_dataset(
@@ -87,6 +65,18 @@ def statistics_dataset(
     return dataset
 
 
+def with_covariance(dataset: xr.Dataset, covariance: np.ndarray, rows: list[int]) -> xr.Dataset:
+    """Add the covariances between responses, of all outputs (k, sources, outputs, outputs) those in ``rows``."""
+    covariance = covariance[:, :, rows][:, :, :, rows]
+    covariance = np.concatenate([covariance, covariance.sum(axis=1, keepdims=True)], axis=1)
+    dataset["covariance"] = (
+        ("time", "source", "response", "other_response"),
+        covariance,
+        {RULE: "response other_response", "long_name": "covariance between responses"},
+    )
+    return dataset.assign_coords(other_response=dataset["response"].values)
+
+
 def with_members(dataset: xr.Dataset, case: Case, parameter_sets: Sequence[Mapping[str, float]]) -> xr.Dataset:
     """Return the dataset of a batch with its parameter values as coordinates over ``member``.
 
@@ -104,3 +94,19 @@ def with_members(dataset: xr.Dataset, case: Case, parameter_sets: Sequence[Mappi
         free = name if name not in dataset.variables and name not in dataset.dims else f"parameter_{name}"
         coordinates[free] = ("member", values, attributes)
     return dataset.assign_coords(coordinates)
+
+
+def batch_dataset(
+    case: Case,
+    times: list[float],
+    members: list[tuple[np.ndarray, np.ndarray]],
+    engine: str,
+    relative_tolerance: float,
+) -> xr.Dataset:
+    """Return the dataset of a batch: statistics of all responses with a dimension ``member`` in front.
+
+    ``members`` are means (k, responses) and variances (k, responses, sources).
+    """
+    attributes = provenance(case) | {"engine": engine, "relative_tolerance": relative_tolerance}
+    mean, variance = (np.array(values) for values in zip(*members, strict=True))
+    return statistics_dataset(case, times, list(case.system.output_names), mean, variance, attributes)

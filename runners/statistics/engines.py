@@ -1,80 +1,85 @@
-"""The engines: roads to the same statistics, by name."""
+"""The engines by name, the choice among them, and the statistics by the one that is chosen."""
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable
+from dataclasses import fields
+from typing import TypeVar
 
 import numpy as np
-import xarray as xr
 
-from ...codegen.sweep.compiled import sweep_of
+from ...model.deprecation import warn_deprecated
 from ...model.errors import AscentwindWarning, IntegrationError, UnknownNameError
-from ...model.system.linear_system import COMBINED
-from ..case.provenance import provenance
-from ..present.netcdf import RULE
-from ..solvers.adjoint import AdjointSolver
-from ..solvers.covariance import CovarianceOptions, covariance_equation
-from ..solvers.ensemble import EnsembleOptions
-from ..solvers.integration import IntegratorOptions
-from ..solvers.sweep import LEAST_TOLERANCE, SweepOptions, SweepResult, available_sweep, sweep
-from ..solvers.time_nodes import time_nodes
-from .dataset import response_dataset, statistics_dataset
-from .ensemble import ensemble_dataset
+from ..case.case import Case
+from ..case.times import end_times
+from ..solvers.stability import warn_if_unstable
+from ..solvers.sweep import available_sweep
+from .covariance import CovarianceEquation
+from .cvodes import Cvodes
+from .engine import Engine, Progress, relative_difference
+from .ensemble import Ensemble
 from .results import ResponseStatistics
+from .sweep import Sweep
 
-if TYPE_CHECKING:
-    from ..case.case import Case
+ENGINES: dict[str, type[Sweep | Cvodes | CovarianceEquation | Ensemble]] = {
+    engine.name: engine for engine in (Sweep, Cvodes, CovarianceEquation, Ensemble)
+}
 
-LOOKS = 1024  # pieces of flight in which a check begins anew
-Progress = Callable[[float], None]
+
+E = TypeVar("E", Sweep, Cvodes)
 
 
 class UncheckedStatisticsWarning(AscentwindWarning):
     """A finer discretisation, asked for as a check, could not be computed; the difference to it is infinite."""
 
 
-@dataclass(frozen=True)
-class Engine:
-    """A way to compute response statistics.
-
-    Attributes
-    ----------
-    label : str
-        For tables that people read.
-    options : type
-        Of its options; made without arguments they are the default.
-    compute : callable
-        (study, increasing end times, responses, options, progress) -> xarray.Dataset of the statistics.
-    finer : callable
-        (options, flight in s) -> options of a finer discretisation, by which the error of the given ones is judged.
-    tight : object or None
-        Options with which engines are held against each other; None for an engine with a sampling error.
-    """
-
-    label: str
-    options: type
-    compute: Callable[[Case, list[float], list[str], Any, Progress | None], xr.Dataset]
-    finer: Callable[[Any, float], Any]
-    tight: object | None
-
-
-def find_engine(name: str) -> Engine:
-    """Return an engine by name.
+def find_engine(engine: str | Engine) -> Engine:
+    """Return an engine, by name with its defaults.
 
     Raises
     ------
     UnknownNameError
+        With the nearest name.
+    IntegrationError
+        What was given is no engine.
     """
-    if name not in ENGINES:
-        raise UnknownNameError("engine", name, ENGINES)
-    return ENGINES[name]
+    if isinstance(engine, str):
+        if engine not in ENGINES:
+            raise UnknownNameError("engine", engine, ENGINES)
+        return ENGINES[engine]()
+    if isinstance(engine, type) or not isinstance(engine, Engine):
+        made = ", ".join(f"{e.__name__}()" for e in ENGINES.values())
+        raise IntegrationError(f"{engine!r:.60} is no engine; give a name ({', '.join(ENGINES)}) or {made}")
+    return engine
 
 
-def engine_options(name: str | None, *, compiled: bool = True, **settings: object) -> tuple[str | None, object | None]:
-    """Return an engine and its options from what a person named; None leaves the choice to the study.
+def engine_as(kind: type[E], engine: str | Engine | None, default: E, what: str) -> E:
+    """Return the engine of the one kind that a question is answered by.
+
+    Parameters
+    ----------
+    kind : type
+        Sweep or Cvodes.
+    engine : str or Engine, optional
+        The default without it or by its name.
+    what : str
+        The question, for the error.
+
+    Raises
+    ------
+    UnknownNameError, IntegrationError
+    """
+    if engine is None or engine == getattr(default, "name", None):
+        return default
+    found = find_engine(engine)
+    if not isinstance(found, kind):
+        raise IntegrationError(f"{what} by {kind.__name__} alone, not by {type(found).__name__}")
+    return found
+
+
+def engine_from(name: str | None, *, compiled: bool = True, **settings: object) -> Engine | None:
+    """Return the engine that a person named, with settings; None leaves the choice to the case.
 
     ``method`` alone means CVODES, and ``relative_tolerance`` alone the sweep, or CVODES where nothing is compiled.
 
@@ -84,210 +89,81 @@ def engine_options(name: str | None, *, compiled: bool = True, **settings: objec
     """
     given = {key: value for key, value in settings.items() if value is not None}
     if name is None and given:
-        name = "cvodes" if "method" in given or not compiled else "sweep"
+        name = Cvodes.name if "method" in given or not compiled else Sweep.name
     if name is None:
-        return None, None
-    takes = {field.name for field in fields(find_engine(name).options)}
+        return None
+    takes = {field.name for field in fields(find_engine(name))}  # type: ignore[arg-type]
     for key in given:
         if key not in takes:
             raise IntegrationError(f"engine '{name}' takes no {key.replace('_', ' ')}; it takes {', '.join(takes)}")
-    return name, find_engine(name).options(**given)
+    return ENGINES[name](**given)  # type: ignore[arg-type]
 
 
-def default_engine(case: Case, options: object | None) -> str:
-    """Return the engine that options belong to; without any the sweep, or CVODES where that cannot be compiled."""
-    if options is not None:
-        return next((name for name, e in ENGINES.items() if isinstance(options, e.options)), "sweep")
-    return "cvodes" if available_sweep(case.executable) is None else "sweep"
-
-
-def compute_statistics(
-    case: Case,
-    times: list[float],
-    responses: list[str],
-    engine: str | None,
-    options: object | None,
-    check: bool,
-    progress: Progress | None,
-) -> ResponseStatistics:
-    """Run an engine; with ``check`` a second time, finer, and keep the relative difference of the std.
+def engine_of_options(engine: str | Engine | None, options: object | None) -> str | Engine | None:
+    """Return what the old argument ``options`` stood for: an engine is its own options now.
 
     Raises
     ------
-    UnknownNameError, IntegrationError
+    IntegrationError
+        The options belong to another engine than the one that is named.
+    """
+    if options is None:
+        return engine
+    warn_deprecated("the argument 'options'", "engine=..., an engine with its options, such as Sweep(1e-9)")
+    found = find_engine(options)  # type: ignore[arg-type]
+    if engine is not None and find_engine(engine).name != found.name:
+        named = find_engine(engine).name
+        raise IntegrationError(f"engine '{named}' takes no {type(found).__name__}; leave one of them out")
+    return found
+
+
+def chosen_engine(case: Case, engine: str | Engine | None) -> Engine:
+    """Return the engine asked for; without one the sweep, or CVODES where that cannot be compiled."""
+    if engine is None:
+        return Cvodes() if available_sweep(case.executable) is None else Sweep()
+    return find_engine(engine)
+
+
+def response_statistics(
+    case: Case,
+    times: Iterable[float],
+    *,
+    responses: Iterable[str] | None = None,
+    engine: str | Engine | None = None,
+    check: bool = False,
+    progress: Progress | None = None,
+) -> ResponseStatistics:
+    """Run an engine; with ``check`` a second time, finer, and keep the relative difference of the std.
+
+    Parameters
+    ----------
+    case : Case
+    times, responses, engine, check, progress
+        As of :meth:`ascentwind.Study.response_statistics`.
+
+    Raises
+    ------
+    TimeRangeError, UnknownNameError, DirectNoiseError, IntegrationError
 
     Warns
     -----
-    UncheckedStatisticsWarning
+    UnstableSystemWarning, UncheckedStatisticsWarning
     """
-    if engine is None:
-        engine = default_engine(case, options)
-    chosen = find_engine(engine)
-    settings = chosen.options() if options is None else options
-    if not isinstance(settings, chosen.options):
-        raise IntegrationError(
-            f"engine '{engine}' takes {chosen.options.__name__}, not {type(settings).__name__}; see ascentwind.runners"
-        )
-    found = chosen.compute(case, times, responses, settings, progress)
+    ends, wanted = case.checked_times(end_times(times)), case.checked_responses(responses)
+    warn_if_unstable(case.executable, ends[-1])
+    chosen = chosen_engine(case, engine)
+    found = chosen.compute(case, ends, wanted, progress)
     if check:
         difference = np.full(found["std"].shape, np.inf)
         try:
-            finer = chosen.compute(case, times, responses, chosen.finer(settings, times[-1] - case.system.start), None)
+            finer = chosen.finer(ends[-1] - case.system.start).compute(case, ends, wanted)
             difference = relative_difference(found["std"].values, finer["std"].values)
         except IntegrationError as error:
             text = f"the statistics could not be checked by a finer discretisation, and none is known to hold: {error}"
-            warnings.warn(UncheckedStatisticsWarning(text), stacklevel=4)
+            warnings.warn(UncheckedStatisticsWarning(text), stacklevel=3)
         found["discretisation_difference"] = (
             found["std"].dims,
             difference,
             {"units": "1", "long_name": "std against a finer discretisation, relative"},
         )
     return ResponseStatistics(found)
-
-
-def relative_difference(value: np.ndarray, reference: np.ndarray) -> np.ndarray:
-    """Return |value - reference| / |reference|, zero where both are."""
-    size = np.abs(reference)
-    difference = np.abs(value - reference)
-    return np.where(difference == 0, 0.0, difference / np.where(size > 0, size, np.finfo(float).tiny))
-
-
-def _cvodes(
-    case: Case, times: list[float], responses: list[str], options: IntegratorOptions, progress: Progress | None
-) -> xr.Dataset:
-    solver = AdjointSolver(case.with_means, options)
-    runs = []
-    for time, node in zip(times, time_nodes(case.executable, times).tolist(), strict=True):
-        runs.append(replace(solver.run(node), time=time))
-        if progress:
-            progress(time)
-    return response_dataset(case, runs, responses, options)
-
-
-def _sweep(
-    case: Case, times: list[float], responses: list[str], options: SweepOptions, progress: Progress | None
-) -> xr.Dataset:
-    engine = sweep_of(case.executable)
-    found = sweep(
-        engine,
-        case.with_means,
-        times,
-        relative_tolerance=options.relative_tolerance,
-        longest_interval=options.longest_interval,
-        responses=responses,
-    )
-    if progress:
-        for time in times:
-            progress(time)
-    return sweep_dataset(case, found, responses, options)
-
-
-def sweep_dataset(case: Case, found: SweepResult, responses: list[str], options: SweepOptions) -> xr.Dataset:
-    """Return the dataset of a sweep: statistics, covariances between responses, and the error estimate."""
-    rows = [case.system.output_index(name) for name in responses]
-    attributes = provenance(case) | {
-        "engine": "sweep",
-        "relative_tolerance": options.relative_tolerance,
-        **{f"sweep_{name}": value for name, value in found.counters.items()},
-    }
-    variance = found.variance[:, rows]
-    dataset = statistics_dataset(case, found.times.tolist(), responses, found.mean[:, rows], variance, attributes)
-    dataset = _with_covariance(dataset, found.covariance, rows)
-    error = np.moveaxis(found.error_estimate[:, :, rows], 1, 2)
-    total = dataset["variance"].sel(source=COMBINED).values
-    shared = (variance * error).sum(axis=2) / np.where(total > 0, total, 1.0)
-    dataset["error_estimate"] = (
-        ("time", "response", "source"),
-        np.concatenate([error, shared[:, :, None]], axis=2),
-        {"units": "1", "long_name": "estimated relative error of the std"},
-    )
-    return dataset
-
-
-def _with_covariance(dataset: xr.Dataset, covariance: np.ndarray, rows: list[int]) -> xr.Dataset:
-    """Add the covariances between responses, of all outputs (k, sources, outputs, outputs) those in ``rows``."""
-    covariance = covariance[:, :, rows][:, :, :, rows]
-    covariance = np.concatenate([covariance, covariance.sum(axis=1, keepdims=True)], axis=1)
-    dataset["covariance"] = (
-        ("time", "source", "response", "other_response"),
-        covariance,
-        {RULE: "response other_response", "long_name": "covariance between responses"},
-    )
-    return dataset.assign_coords(other_response=dataset["response"].values)
-
-
-def batch_dataset(
-    case: Case,
-    times: list[float],
-    members: list[tuple[np.ndarray, np.ndarray]],
-    engine: str,
-    relative_tolerance: float,
-) -> xr.Dataset:
-    """Return the dataset of a batch: statistics of all responses with a dimension ``member`` in front.
-
-    ``members`` are means (k, responses) and variances (k, responses, sources).
-    """
-    attributes = provenance(case) | {"engine": engine, "relative_tolerance": relative_tolerance}
-    mean, variance = (np.array(values) for values in zip(*members, strict=True))
-    return statistics_dataset(case, times, list(case.system.output_names), mean, variance, attributes)
-
-
-def _covariance(
-    case: Case, times: list[float], responses: list[str], options: CovarianceOptions, progress: Progress | None
-) -> xr.Dataset:
-    rows = [case.system.output_index(name) for name in responses]
-    found = covariance_equation(
-        case.with_means, times, options.relative_tolerance, progress, options.longest_interval, options.absolute_part
-    )
-    attributes = provenance(case) | {"engine": "covariance", "relative_tolerance": options.relative_tolerance}
-    dataset = statistics_dataset(case, times, responses, found.mean[:, rows], found.variance[:, rows], attributes)
-    return _with_covariance(dataset, found.covariance, rows)
-
-
-def _ensemble(
-    case: Case, times: list[float], responses: list[str], options: EnsembleOptions, progress: Progress | None
-) -> xr.Dataset:
-    found = ensemble_dataset(case, times, responses, options)
-    if progress:
-        progress(times[-1])
-    return found
-
-
-def _finer_sweep(options: SweepOptions, flight: float) -> SweepOptions:
-    """Return a tenth of the tolerance, in pieces so short that no step passes over what the first pass missed."""
-    return _in_pieces(options, flight, 0.1)
-
-
-def _begun_anew(options: Any, flight: float) -> Any:
-    """Return options for the same pieces; beginning anew in each has an error of its own, kept below the first's.
-
-    Absolutely the tolerance is far less, or both passes would miss the same where sizes are misjudged.
-    """
-    return _in_pieces(options, flight, 1e-3)
-
-
-def _in_pieces(options: Any, flight: float, share: float) -> Any:
-    tolerance = max(LEAST_TOLERANCE, share * options.relative_tolerance)
-    longest = min(options.longest_interval, flight / LOOKS) if flight > 0 else options.longest_interval
-    finer = replace(options, relative_tolerance=tolerance, longest_interval=longest)
-    return replace(finer, absolute_part=1e-6 * options.absolute_part) if hasattr(options, "absolute_part") else finer
-
-
-def _finer_ensemble(options: EnsembleOptions, flight: float) -> EnsembleOptions:
-    return replace(options, substep=min(0.5 * options.substep, flight / LOOKS) if flight > 0 else options.substep)
-
-
-ENGINES = {
-    "sweep": Engine("sweep", SweepOptions, _sweep, _finer_sweep, SweepOptions(relative_tolerance=1e-9)),
-    "cvodes": Engine(
-        "adjoint (CVODES)", IntegratorOptions, _cvodes, _begun_anew, IntegratorOptions(relative_tolerance=1e-9)
-    ),
-    "covariance": Engine(
-        "covariance equation (SciPy)",
-        CovarianceOptions,
-        _covariance,
-        _begun_anew,
-        CovarianceOptions(relative_tolerance=1e-9),
-    ),
-    "ensemble": Engine("ensemble", EnsembleOptions, _ensemble, _finer_ensemble, None),
-}

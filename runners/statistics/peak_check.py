@@ -19,9 +19,9 @@ from ..present.style import display, words
 from ..solvers.adjoint import AdjointHistory, AdjointSolver
 from ..solvers.covariance import covariance_equation
 from ..solvers.ensemble import std_interval
-from ..solvers.integration import IntegratorOptions
 from ..solvers.mean_response import with_mean_tables
-from .engines import relative_difference
+from .cvodes import Cvodes
+from .engine import relative_difference
 from .larger_side import larger_side, sign
 from .peaks import Peak
 from .results import ResponseStatistics
@@ -119,7 +119,7 @@ def check_peaks(case: Case, statistics: ResponseStatistics) -> PeakCheck:
         reference, result = "covariance", covariance_equation(case.with_means, times, COVARIANCE_TOLERANCE)
         mean, variance = result.mean, result.variance.sum(axis=2)
     else:
-        reference, solver = "cvodes", AdjointSolver(_with_own_means(case), IntegratorOptions())
+        reference, solver = "cvodes", AdjointSolver(_with_own_means(case), Cvodes())
         runs = []
         for time in times:
             run, histories[time] = solver.run_with_history(time, SPACING)
@@ -225,8 +225,8 @@ def _weighting(check: PeakCheck, case: Case) -> dict[str, tuple]:
 
 def weighting_at(case: Case, check: PeakCheck, time: float) -> xr.Dataset:
     """Return the weighting functions at an end time, those of the check where it is a peak's."""
-    history = check.histories.get(time)
-    return case.weighting_function(time) if history is None else weighting_dataset(case, time, history)
+    history = check.histories.get(time) or AdjointSolver(case.with_means, Cvodes()).history(time, SPACING)
+    return weighting_dataset(case, time, history)
 
 
 def in_words(difference: float) -> str:

@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 
 from ...codegen.system.functions import state_scales
 from ..solvers.adjoint import AdjointSolver
-from ..solvers.covariance import CovarianceOptions
-from ..solvers.integration import IntegratorOptions
 from ..solvers.stability import matrices_at
-from .engines import ENGINES, Progress, relative_difference
+from .covariance import CovarianceEquation
+from .cvodes import Cvodes
+from .engine import Progress, relative_difference
+from .engines import response_statistics
+from .sweep import Sweep
 
 if TYPE_CHECKING:
     from ..case.case import Case
@@ -68,17 +70,14 @@ class Pace:
     pacing_state: str
 
 
-def variants() -> dict[str, tuple[str, object]]:
-    """Return the engines with a tolerance, by label: name and options."""
-    found: dict[str, tuple[str, object]] = {}
+def variants() -> dict[str, Cvodes | Sweep]:
+    """Return the engines with a tolerance, the reference excepted, by label."""
+    found: dict[str, Cvodes | Sweep] = {}
     for method in ("adams", "bdf"):
         for iteration in ("newton", "functional"):
             label = f"CVODES {'Adams' if method == 'adams' else 'BDF'}, {iteration}"
-            found[label] = ("cvodes", IntegratorOptions(method=method, iteration=iteration))
-    for name, engine in ENGINES.items():
-        if name not in ("cvodes", "covariance") and engine.tight is not None:
-            found[engine.label] = (name, engine.options())
-    return found
+            found[label] = Cvodes(method=method, iteration=iteration)
+    return found | {Sweep.label: Sweep()}
 
 
 def measure(
@@ -99,15 +98,13 @@ def measure(
     ------
     TimeRangeError, IntegrationError
     """
-    tight = CovarianceOptions(REFERENCE_TOLERANCE)
-    reference = case.response_statistics(times, engine="covariance", options=tight).std.values
+    reference = response_statistics(case, times, engine=CovarianceEquation(REFERENCE_TOLERANCE)).std.values
     found = []
     for tolerance in tolerances:
-        for label, (engine, options) in variants().items():
-            finer = replace(options, relative_tolerance=tolerance)  # type: ignore[type-var]
-            compute = ENGINES[engine].compute
+        for label, engine in variants().items():
+            finer = replace(engine, relative_tolerance=tolerance)
             start = clock.perf_counter()
-            statistics = compute(case, times, list(case.system.output_names), finer, None)
+            statistics = finer.compute(case, times, list(case.system.output_names))
             seconds = clock.perf_counter() - start
             error = float(relative_difference(statistics.std.values, reference).max())
             found.append(Measurement(label, tolerance, error, seconds))
@@ -136,9 +133,9 @@ def pacing(case: Case, time: float, windows: int = 8, tolerance: float = 1e-7) -
     case.matrices(time)
     system, executable = case.system, case.with_means
     edges = np.linspace(system.start, time, windows + 1)
-    history = AdjointSolver(executable, IntegratorOptions(relative_tolerance=PRECISE)).history(time, 0.05)
+    history = AdjointSolver(executable, Cvodes(relative_tolerance=PRECISE)).history(time, 0.05)
     solvers = {
-        iteration: AdjointSolver(executable, IntegratorOptions(iteration=iteration, relative_tolerance=tolerance))
+        iteration: AdjointSolver(executable, Cvodes(iteration=iteration, relative_tolerance=tolerance))
         for iteration in ("functional", "newton")
     }
     paces = []

@@ -8,14 +8,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..solvers.ensemble import EnsembleOptions, mean_interval, std_interval
-from .engines import ENGINES, Progress, relative_difference
+from ..solvers.ensemble import mean_interval, std_interval
+from .cvodes import Cvodes
+from .engine import Progress, relative_difference
+from .engines import ENGINES, response_statistics
+from .ensemble import Ensemble
 from .results import ResponseStatistics
 
 if TYPE_CHECKING:
     from ..case.case import Case
 
-REFERENCE = "cvodes"
+REFERENCE = Cvodes.name
 LIMIT = 1e-6  # relative, between engines that only discretise
 SUBSTEP_ERROR = 5e-5  # relative, of an ensemble of infinitely many runs (tests/runners/solvers/test_ensemble.py)
 FALSE_ALARM = 1e-3  # chance that a right ensemble is called wrong, all entries together
@@ -92,7 +95,7 @@ class Verification:
         )
 
 
-def verify(case: Case, times: list[float], ensemble: EnsembleOptions, progress: Progress | None = None) -> Verification:
+def verify(case: Case, times: list[float], ensemble: Ensemble, progress: Progress | None = None) -> Verification:
     """Compute the statistics with every engine at a tight setting and compare.
 
     Parameters
@@ -100,7 +103,7 @@ def verify(case: Case, times: list[float], ensemble: EnsembleOptions, progress: 
     case : Case
     times : list of float
         s.
-    ensemble : EnsembleOptions
+    ensemble : Ensemble
     progress : callable, optional
 
     Raises
@@ -109,13 +112,12 @@ def verify(case: Case, times: list[float], ensemble: EnsembleOptions, progress: 
     """
     statistics = {}
     for name, engine in ENGINES.items():
-        options = ensemble if engine.tight is None else engine.tight
-        statistics[name] = case.response_statistics(times, engine=name, options=options, progress=progress)
+        statistics[name] = response_statistics(case, times, engine=engine.tight() or ensemble, progress=progress)
     reference = statistics[REFERENCE]
     std, mean = reference.std.values, reference.mean.values
     differences, mean_differences = {}, {}
     for name, found in statistics.items():
-        if name == REFERENCE or ENGINES[name].tight is None:
+        if name == REFERENCE or ENGINES[name].tight() is None:
             continue
         differences[name] = relative_difference(found.std.values, std)
         size = np.maximum(np.maximum(np.abs(mean), std), np.finfo(float).tiny)

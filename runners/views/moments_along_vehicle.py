@@ -24,6 +24,7 @@ from ...model.vehicle.noise_loads import loading_noises
 from ..case.provenance import provenance
 from ..solvers.time_nodes import interval_before, time_nodes
 from ..statistics.dataset import QUANTITIES
+from ..statistics.engine import Engine
 
 if TYPE_CHECKING:
     from ..study import Study
@@ -34,8 +35,7 @@ def moments_along_vehicle(
     times: Iterable[float],
     *,
     slosh_reaction: bool = True,
-    engine: str | None = None,
-    options: object | None = None,
+    engine: str | Engine | None = None,
 ) -> xr.Dataset:
     """Return mean, variance, std and mean + 3 sigma of the bending moment over (time, station, source).
 
@@ -48,9 +48,8 @@ def moments_along_vehicle(
     slosh_reaction : bool
         Whether the whole vehicle answers slosh. Without, as the report has it, the moment does not vanish at the tail.
         Here it does not follow the vehicle's option, which is for its outputs.
-    engine : {'sweep', 'covariance'}, optional
+    engine : Sweep, CovarianceEquation or their names, optional
         Those that give covariances; the sweep where something is compiled.
-    options : SweepOptions or CovarianceOptions, optional
 
     Raises
     ------
@@ -62,9 +61,9 @@ def moments_along_vehicle(
     tanks = [tank.name for tank in study.vehicle.slosh]
     names = list(component_columns(len(study.vehicle.bending), tanks, loading_noises(study.vehicle.file)))
     components = _with_components(study)
-    if engine is None and options is None:
+    if engine is None:
         engine = "covariance" if study.executable.shared_library is None else "sweep"
-    found = components.response_statistics(times, responses=names, engine=engine, options=options)
+    found = components.response_statistics(times, responses=names, engine=engine)
     if "covariance" not in found:
         raise IntegrationError(f"engine '{found.attrs['engine']}' gives no covariances; use sweep or covariance")
     at = found["time"].values

@@ -24,7 +24,7 @@ from ...model.wind.shaping_filter import ShapingFilter, entry_name
 from ...model.wind.statistics import WindStatistics
 from ..solvers.adjoint import AdjointSolver
 from ..solvers.discretisation import symmetric_root
-from ..solvers.integration import IntegratorOptions
+from ..solvers.integration import CvodesSettings
 from .fitting.altitude_grid import transition
 from .fitting.frozen_poles import largest_pole
 from .fitting.intervals import share_inside
@@ -119,7 +119,7 @@ def engine_covariance(
             "verify it within its range"
         )
     system = altitude_system(shaping_filter, tuple(altitude.tolist()))
-    solver = AdjointSolver(executable_system(system, compile), IntegratorOptions(relative_tolerance=TOLERANCE))
+    solver = AdjointSolver(executable_system(system, compile), CvodesSettings(relative_tolerance=TOLERANCE))
     result = np.zeros((altitude.size, altitude.size))
     P0 = shaping_filter.start_covariance
     runs = []

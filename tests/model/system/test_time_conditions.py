@@ -19,9 +19,9 @@ from ascentwind.model import LinearSystem, define_system
 from ascentwind.model.errors import IntegrationError, NonlinearSystemError, SwitchError
 from ascentwind.model.system.interval_arithmetic import bounds
 from ascentwind.model.tables import TableGroup
-from ascentwind.runners import CovarianceOptions, IntegratorOptions, Study, SweepOptions
+from ascentwind.runners import CovarianceEquation, Cvodes, Study, Sweep
 from ascentwind.runners.solvers.discretisation import discretise
-from ascentwind.runners.statistics.engines import ENGINES, UncheckedStatisticsWarning
+from ascentwind.runners.statistics.engines import UncheckedStatisticsWarning
 
 T = ca.SX.sym("t")
 
@@ -39,11 +39,11 @@ def by_every_engine(study: Study, times, response: int = 0) -> dict[str, tuple[n
     """Variance and mean of a response at end times, by name of the engine."""
     found = {}
     for name, options in (
-        ("sweep", SweepOptions(1e-10)),
-        ("cvodes", IntegratorOptions(relative_tolerance=1e-10)),
-        ("covariance", CovarianceOptions(1e-11)),
+        ("sweep", Sweep(1e-10)),
+        ("cvodes", Cvodes(relative_tolerance=1e-10)),
+        ("covariance", CovarianceEquation(1e-11)),
     ):
-        statistics = study.response_statistics(times, engine=name, options=options)
+        statistics = study.response_statistics(times, engine=options)
         found[name] = statistics.variance.values[:, response, -1], statistics.mean.values[:, response, -1]
     exact = discretise(study.with_means, list(times), 0.01)
     found["ensemble, infinitely many runs"] = exact.variance()[:, response].sum(axis=1), exact.mean[:, response]
@@ -118,10 +118,10 @@ def test_every_way_to_write_a_condition(way):
     for time in breaks:
         assert np.abs(stops.times - time).min() < 1e-12
     for engine, options in (
-        ("cvodes", IntegratorOptions(relative_tolerance=1e-10)),
-        ("covariance", CovarianceOptions(1e-11)),
+        ("cvodes", Cvodes(relative_tolerance=1e-10)),
+        ("covariance", CovarianceEquation(1e-11)),
     ):
-        found = study.response_statistics([4.0], engine=engine, options=options).variance.values[0, 0, 0]
+        found = study.response_statistics([4.0], engine=options).variance.values[0, 0, 0]
         assert found == pytest.approx(expected, rel=1e-7), engine
 
 
@@ -147,7 +147,7 @@ def test_switches_move_with_the_numbers_of_a_case(switched, t1, t2, t3, a1, a2, 
 
 def test_a_batch_and_weighting_functions_stop_at_each_members_switches(switched):
     sets = [{"t1": t1, "t2": t1 + 0.003} for t1 in (0.4, 0.9, 1.7)]
-    found = switched.batch(sets, [3.0], options=SweepOptions(1e-9))
+    found = switched.batch(sets, [3.0], engine=Sweep(1e-9))
     expected = [pieces(NOMINAL | values, 3.0) for values in sets]
     np.testing.assert_allclose(found.variance.values[:, 0, 0, 0], [v for v, _ in expected], rtol=1e-8)
     np.testing.assert_allclose(found.mean.values[:, 0, 0, 0], [m for _, m in expected], rtol=1e-8)
@@ -231,7 +231,7 @@ def test_a_check_that_fails_does_not_cost_the_result(monkeypatch):
     def fail(options, flight):
         raise IntegrationError("a tolerance cannot be met")
 
-    monkeypatch.setitem(ENGINES, "sweep", replace(ENGINES["sweep"], finer=fail))
+    monkeypatch.setattr(Sweep, "finer", fail)
     with pytest.warns(UncheckedStatisticsWarning, match="could not be checked.*: a tolerance cannot be met"):
         found = study.response_statistics([2.0], check=True)
     np.testing.assert_array_equal(found.std, expected)

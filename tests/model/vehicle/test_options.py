@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from ascentwind.model.wind.statistics import report_standard_deviation
-from ascentwind.runners import IntegratorOptions, Study
+from ascentwind.runners import Cvodes, Study
 from ascentwind.runners.solvers.covariance import covariance_equation
 
-TIGHT = IntegratorOptions(relative_tolerance=1e-9)
+TIGHT = Cvodes(relative_tolerance=1e-9)
 
 
 def test_full_coupling_has_one_symmetric_positive_mass_matrix(edit, as504):
@@ -25,10 +25,10 @@ def test_full_coupling_has_one_symmetric_positive_mass_matrix(edit, as504):
     stiffness = v["slosh.sic_lox.mass"] * v["slosh.sic_lox.frequency"] ** 2
     # to leading order the spring of the slosh mass pushes the vehicle: m Y'' = ... + m_S w^2 xi
     assert A[row, xi] == pytest.approx(stiffness / v["mass"], rel=0.6)
-    found = study.response_statistics([40.0], options=TIGHT)
+    found = study.response_statistics([40.0], engine=TIGHT)
     forward = covariance_equation(study.with_means, [40.0], 1e-9)
     np.testing.assert_allclose(found.variance.values[:, :, :3], forward.variance, rtol=1e-5)
-    plain = as504.response_statistics([40.0], options=TIGHT)
+    plain = as504.response_statistics([40.0], engine=TIGHT)
     wind = {"response": "bending_moment", "source": "wind", "time": 40}
     change = float(found.std.sel(wind) / plain.std.sel(wind)) - 1
     assert 1e-4 < abs(change) < 0.2
@@ -47,7 +47,7 @@ def test_changes_are_as_if_the_file_had_been_edited(edit):
 def test_extra_outputs_are_what_their_names_say(edit, as504):
     extra = '"lateral_drift", "drift_rate", "dynamic_pressure_times_angle_of_attack"'
     study = Study.load(edit("extra_outputs = []", f"extra_outputs = [{extra}]"))
-    found, plain = (s.response_statistics([50.0, 50.2], options=TIGHT) for s in (study, as504))
+    found, plain = (s.response_statistics([50.0, 50.2], engine=TIGHT) for s in (study, as504))
     q = study.tables(50.0)["dynamic_pressure"]
     ratio = found.std.sel(response="dynamic_pressure_times_angle_of_attack", time=50) / found.std.sel(
         response="angle_of_attack", time=50
@@ -75,7 +75,7 @@ def test_further_stations_come_from_data(vehicle_folder, edit):
     study = Study.load(
         edit("# Relative deviations of tables", entry + "# Relative deviations of tables"), compile=False
     )
-    found = study.response_statistics([30.0], options=TIGHT)
+    found = study.response_statistics([30.0], engine=TIGHT)
     np.testing.assert_allclose(
         2 * found.std.sel(response="bending_moment_b"), found.std.sel(response="bending_moment"), rtol=1e-6
     )
@@ -99,7 +99,7 @@ def test_fewer_modes_and_tanks_come_from_data(vehicle_folder):
         (vehicle_folder / file).write_text("\n".join(body) + "\n")
     study = Study.load(vehicle_folder, compile=False)
     assert len(study.system.states) == 3 + 11 + 2 + 3 + 2
-    found = study.response_statistics([30.0], options=TIGHT)
+    found = study.response_statistics([30.0], engine=TIGHT)
     forward = covariance_equation(study.with_means, [30.0], 1e-9)
     np.testing.assert_allclose(found.variance.values[:, :, :3], forward.variance, rtol=1e-5)
 

@@ -20,7 +20,7 @@ from ascentwind.model.errors import (
 )
 from ascentwind.model.vehicle.reader import load_vehicle
 from ascentwind.model.vehicle.shipped import built_in_vehicles
-from ascentwind.runners import IntegratorOptions, Study
+from ascentwind.runners import Cvodes, Study
 from ascentwind.runners.case.times import parse_times
 from ascentwind.runners.cli.app import main
 from ascentwind.runners.cli.new_vehicle import copy_vehicle
@@ -120,9 +120,9 @@ def test_other_refusals(tmp_path, vehicle_folder):
     with pytest.raises(DataError, match="holds no vehicle.toml"):
         load_vehicle(tmp_path)
     with pytest.raises(IntegrationError, match="cannot be met"):
-        IntegratorOptions(relative_tolerance=1e-16)
+        Cvodes(relative_tolerance=1e-16)
     with pytest.raises(IntegrationError, match="method 'rk4' is not known"):
-        IntegratorOptions(method="rk4")  # type: ignore[arg-type]
+        Cvodes(method="rk4")  # type: ignore[arg-type]
     with pytest.raises(OutputFolderError, match="exists already and is not empty"):
         copy_vehicle("as504", vehicle_folder)
     (tmp_path / "file").write_text("")
@@ -132,7 +132,7 @@ def test_other_refusals(tmp_path, vehicle_folder):
 
 def test_integrator_that_gives_up_says_where(as504):
     with pytest.raises(IntegrationError, match=r"more than 50 steps .* between 10 s and 60 s; the fastest root"):
-        as504.response_statistics([60.0], options=IntegratorOptions(max_steps=50))
+        as504.response_statistics([60.0], engine=Cvodes(max_steps=50))
 
 
 @pytest.mark.parametrize("text", ["40:100", "a,b", "100:40:5", "40:100:0", "40:100:-5", "nan:1:1", "0:1:1e-9", ""])

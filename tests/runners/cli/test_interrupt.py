@@ -16,7 +16,7 @@ import pytest
 
 from ascentwind.codegen.toolchain.interruption import Workers, interruptible
 from ascentwind.model.vehicle.shipped import built_in_vehicles
-from ascentwind.runners import IntegratorOptions
+from ascentwind.runners import Cvodes
 from ascentwind.runners.cli.exit_codes import INTERRUPTED
 from ascentwind.runners.solvers.cores import available_cores
 
@@ -130,12 +130,12 @@ def signal_after(seconds: float) -> threading.Timer:
 @pytest.mark.parametrize("engine", ["cvodes", "sweep"])
 def test_library_raises_keyboard_interrupt(as504, engine):
     """In Python too; CVODES does not take it for a failure of the equations."""
-    options = IntegratorOptions(relative_tolerance=1e-13, method="bdf") if engine == "cvodes" else None
+    options = Cvodes(relative_tolerance=1e-13, method="bdf") if engine == "cvodes" else None
     as504.response_statistics([20.0], engine=engine)
     timer = signal_after(0.3)
     with pytest.raises(KeyboardInterrupt):
         for _ in range(1000):
-            as504.response_statistics(np.arange(20.0, 140.0), engine=engine, options=options)
+            as504.response_statistics(np.arange(20.0, 140.0), engine=options or engine)
     timer.join()
     assert as504.response_statistics([20.0], engine=engine).variance.values.min() > 0
 

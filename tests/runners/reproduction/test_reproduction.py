@@ -12,7 +12,7 @@ from ascentwind.model.errors import DataError
 from ascentwind.model.vehicle.noise_loads import NOISE_LOADS
 from ascentwind.model.vehicle.shipped import built_in_vehicles
 from ascentwind.model.vehicle.vehicle_file import read_vehicle_file
-from ascentwind.runners import Study, SweepOptions
+from ascentwind.runners import Study, Sweep
 from ascentwind.runners.reproduction.as506.flight import FlightCheck
 from ascentwind.runners.reproduction.calibration import Calibration, Input
 from ascentwind.runners.reproduction.directional import directional_derivative
@@ -27,11 +27,11 @@ from ascentwind.runners.views.wind_comparison import stretched
 
 AS504 = built_in_vehicles()["as504"]
 PAGE = Path(__file__).parents[3] / "docs" / "reproduction.md"
-TIGHT = SweepOptions(relative_tolerance=1e-10)
+TIGHT = Sweep(relative_tolerance=1e-10)
 
 
 def moment(study: Study, quantity: str) -> float:
-    found = study.response_statistics([70.0], options=TIGHT)
+    found = study.response_statistics([70.0], engine=TIGHT)
     return float(found[quantity].sel(response="bending_moment", source="wind").item())
 
 
@@ -79,7 +79,7 @@ def test_first_order_change_of_the_mean_wind_reaches_what_the_noises_multiply(as
     moved = [as504.with_parameters({"wind.mean_scale": 1 + sign * 1e-3}) for sign in (-1, 1)]
     first_order = np.diff([directional_derivative(found, as504, study) for study in moved])[0]
     peaks = [
-        study.response_statistics([70.0], options=TIGHT)["mean_plus_3sigma"]
+        study.response_statistics([70.0], engine=TIGHT)["mean_plus_3sigma"]
         .sel(response="bending_moment", source="combined")
         .item()
         for study in moved

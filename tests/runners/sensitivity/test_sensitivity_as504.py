@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ascentwind.codegen.nodes.compiled import node_functions_of
-from ascentwind.runners import IntegratorOptions
+from ascentwind.runners import Cvodes
 from ascentwind.runners.sensitivity.check import _with_row, central_difference, of_vehicle
 from ascentwind.runners.sensitivity.gradient import gradient_of
 from ascentwind.runners.sensitivity.pair import AdjointPair
@@ -27,7 +27,7 @@ def at_75(as504):
 
 
 def test_collocation_meets_cvodes(as504, at_75):
-    run = AdjointSolver(as504.with_means, IntegratorOptions(relative_tolerance=1e-12)).run(75.0)
+    run = AdjointSolver(as504.with_means, Cvodes(relative_tolerance=1e-12)).run(75.0)
     assert at_75.attrs["variance"] == pytest.approx(run.variance[0].sum(), rel=1e-8)
     assert at_75.attrs["mean"] == pytest.approx(run.mean[0], rel=1e-8)
 

@@ -9,9 +9,10 @@ import pytest
 from ascentwind.codegen.ensemble.compiled import EnsembleNeedsCompilerError, compiled_ensemble
 from ascentwind.model import LinearSystem, define_system
 from ascentwind.model.errors import IntegrationError, UnknownNameError
-from ascentwind.runners import CovarianceOptions, EnsembleOptions, IntegratorOptions, Study
+from ascentwind.runners import CovarianceEquation, Cvodes, Ensemble, Study
 from ascentwind.runners.solvers.discretisation import discretise, exact_steps
-from ascentwind.runners.solvers.ensemble import EnsembleOptionsError, mean_interval, std_interval
+from ascentwind.runners.solvers.ensemble import mean_interval, std_interval
+from ascentwind.runners.statistics.ensemble import EnsembleOptionsError
 
 
 def pair(start_covariance=None) -> LinearSystem:
@@ -101,7 +102,7 @@ def test_steps_of_as504_meet_the_adjoint(as504):
     """Behind a gain switch too; far below the sampling error of any ensemble one would run."""
     times = [40.0, 75.0, 110.0]
     found = discretise(as504.with_means, times, 0.05)
-    adjoint = as504.response_statistics(times, engine="cvodes", options=IntegratorOptions(relative_tolerance=1e-9))
+    adjoint = as504.response_statistics(times, engine=Cvodes(relative_tolerance=1e-9))
     np.testing.assert_allclose(np.sqrt(found.variance()), adjoint.std.values[:, :, :3], rtol=5e-5)
     np.testing.assert_allclose(found.mean, adjoint.mean.values[:, :, 0], rtol=1e-4)
 
@@ -122,8 +123,8 @@ def coverage(study: Study, times, std, mean, seeds) -> float:
     """Share of standard deviations and means within the 99 % interval of 20,000 runs."""
     inside = []
     for seed in seeds:
-        options = EnsembleOptions(runs=20_000, seed=seed, confidence=0.99)
-        found = study.response_statistics(times, engine="ensemble", options=options)
+        options = Ensemble(runs=20_000, seed=seed, confidence=0.99)
+        found = study.response_statistics(times, engine=options)
         slack = 1e-6 * np.abs(mean)  # a source that does not reach a response has an interval of no length
         inside.append((found["std_low"].values <= std) & (std <= found["std_high"].values))
         inside.append((found["mean_low"].values - slack <= mean) & (mean <= found["mean_high"].values + slack))
@@ -147,9 +148,9 @@ def test_twenty_thousand_runs_contain_the_adjoint_of_as504(as504):
 
 
 def test_a_seed_is_the_same_noise_on_any_number_of_threads(study, monkeypatch):
-    monkeypatch.setattr("ascentwind.runners.solvers.ensemble.available_cores", lambda: 4)
+    monkeypatch.setattr("ascentwind.runners.statistics.ensemble.available_cores", lambda: 4)
     one, four, other = (
-        study.response_statistics([1.0], engine="ensemble", options=EnsembleOptions(runs=1700, seed=s, threads=n)).std
+        study.response_statistics([1.0], engine=Ensemble(runs=1700, seed=s, threads=n)).std
         for s, n in ((1, 1), (1, 4), (2, 4))
     )
     np.testing.assert_array_equal(one.values, four.values)
@@ -157,8 +158,8 @@ def test_a_seed_is_the_same_noise_on_any_number_of_threads(study, monkeypatch):
 
 
 def test_paths_are_the_runs_that_the_statistics_are_of(study):
-    options = EnsembleOptions(runs=600, paths=600, path_spacing=0.25)
-    found = study.response_statistics([1.0, 3.0], engine="ensemble", options=options)
+    options = Ensemble(runs=600, paths=600, path_spacing=0.25)
+    found = study.response_statistics([1.0, 3.0], engine=options)
     assert found["sample_path"].sizes == {"path": 600, "t": 13, "response": 2}
     at = found["sample_path"].sel(t=[1.0, 3.0]).values
     np.testing.assert_allclose(at.std(axis=0, ddof=1), found.std.sel(source="combined").values, rtol=1e-12)
@@ -167,8 +168,8 @@ def test_paths_are_the_runs_that_the_statistics_are_of(study):
 
 def test_paths_are_continuous_in_time(study):
     """Neighbouring points of a path belong to one flight: y hardly moves in 10 ms, against its spread."""
-    options = EnsembleOptions(runs=50, paths=50, path_spacing=0.01)
-    found = study.response_statistics([3.0], engine="ensemble", options=options)
+    options = Ensemble(runs=50, paths=50, path_spacing=0.01)
+    found = study.response_statistics([3.0], engine=options)
     late = found["sample_path"].values[:, 100:]
     assert np.abs(np.diff(late, axis=1)).max() < 0.5 * late[:, -1, 0].std()
 
@@ -186,15 +187,13 @@ def test_paths_are_continuous_in_time(study):
 )
 def test_impossible_options_are_refused(options, words):
     with pytest.raises(EnsembleOptionsError, match=words):
-        EnsembleOptions(**options)
+        Ensemble(**options)
 
 
 @pytest.mark.filterwarnings("ignore:no C compiler")
 def test_engines_are_named_and_take_their_own_options(study, monkeypatch):
     with pytest.raises(UnknownNameError, match="did you mean 'ensemble'"):
         study.response_statistics([1.0], engine="ensembel")
-    with pytest.raises(IntegrationError, match="takes EnsembleOptions, not IntegratorOptions"):
-        study.response_statistics([1.0], engine="ensemble", options=IntegratorOptions())
     monkeypatch.setenv("CC", "")
     interpreted = Study.from_system(study.system)  # the other may have compiled its ensemble before
     with pytest.raises(EnsembleNeedsCompilerError, match="no C compiler"):
@@ -211,8 +210,8 @@ def test_a_system_that_grows_beyond_numbers_is_refused():
 @pytest.mark.parametrize("engine", ["cvodes", "covariance"])
 def test_check_is_the_error_within_its_order(study, engine):
     """The difference to a finer discretisation against the true error, from the closed form."""
-    options = (IntegratorOptions if engine == "cvodes" else CovarianceOptions)(relative_tolerance=1e-4)
-    found = study.response_statistics([3.0], engine=engine, options=options, check=True)
+    options = (Cvodes if engine == "cvodes" else CovarianceEquation)(relative_tolerance=1e-4)
+    found = study.response_statistics([3.0], engine=options, check=True)
     error = abs(float(found.std.values[0, 0, 0]) / np.sqrt(lag_variance(3.0)) - 1)
     difference = float(found["discretisation_difference"].values[0, 0, 0])
     assert 0.2 * error < difference < 5 * error

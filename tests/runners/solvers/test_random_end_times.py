@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from test_time_nodes import SWITCHES, switching
 
-from ascentwind.runners import IntegratorOptions, Study
+from ascentwind.runners import Cvodes, Study
 
 GRIDS = int(os.environ.get("ASCENTWIND_TEST_GRIDS", "12"))
 AGREEMENT = 1e-5
@@ -34,7 +34,7 @@ def furthest(study: Study, times: list[float]) -> float:
     """Return the largest relative difference of a standard deviation between the sweep and CVODES."""
     swept = study.response_statistics(times, engine="sweep")
     np.testing.assert_array_equal(swept["time"].values, times)
-    expected = study.response_statistics(times, options=IntegratorOptions(relative_tolerance=1e-8))
+    expected = study.response_statistics(times, engine=Cvodes(relative_tolerance=1e-8))
     return float(np.abs(swept.std.values / expected.std.values - 1).max())
 
 

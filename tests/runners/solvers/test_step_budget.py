@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 
 from ascentwind.model import define_system
 from ascentwind.model.errors import IntegrationError, StepBudgetError
-from ascentwind.runners import EnsembleOptions, Study
+from ascentwind.runners import Ensemble, Study
 from ascentwind.runners.solvers.step_budget import at_most
 
 FAST = 3e6  # rad/s
@@ -63,7 +63,7 @@ def test_stiff_but_damped_is_no_case_for_a_budget():
 
 def test_substeps_of_an_ensemble_are_bounded():
     with pytest.raises(IntegrationError, match=r"substeps of 1e-09 s make 2e\+10"):
-        fast_oscillator(1.0).response_statistics([20.0], engine="ensemble", options=EnsembleOptions(substep=1e-9))
+        fast_oscillator(1.0).response_statistics([20.0], engine=Ensemble(substep=1e-9))
 
 
 @pytest.mark.parametrize("engine", ["sweep", "cvodes", "covariance"])

@@ -28,9 +28,9 @@ from ascentwind.model.vehicle.shipped import built_in_vehicles
 from ascentwind.runners.solvers.adjoint import AdjointSolver
 from ascentwind.runners.solvers.cores import available_cores
 from ascentwind.runners.solvers.covariance import covariance_equation
-from ascentwind.runners.solvers.integration import IntegratorOptions
 from ascentwind.runners.solvers.mean_response import with_mean_tables
 from ascentwind.runners.solvers.sweep import BatchError, batch, sweep, with_sweep_mean_tables
+from ascentwind.runners.statistics.cvodes import Cvodes
 
 VEHICLE = built_in_vehicles()["as504"]
 START = np.diag([1.0, 3.0, 1.0])  # any covariance of the wind filter's states serves for a comparison
@@ -48,7 +48,7 @@ def as504():
 def reference(as504):
     """Variances and means at the ten times."""
     executable = as504[1]
-    solver = AdjointSolver(executable, IntegratorOptions(relative_tolerance=1e-12))
+    solver = AdjointSolver(executable, Cvodes(relative_tolerance=1e-12))
     runs = [solver.run(t) for t in TEN]
     variance = np.array([run.variance for run in runs])
     # near the start CVODES' thrust variance, tiny against the wind's, is erratic: 7e-8 off at 1e-11
@@ -152,7 +152,7 @@ def test_own_system_with_more_than_one_block_of_columns():
     system = oscillator_chain(20)
     executable, times = executable_system(system), [12.0, 30.0]
     result = sweep(compiled_sweep(system), executable, times, relative_tolerance=1e-9)
-    runs = [AdjointSolver(executable, IntegratorOptions(relative_tolerance=1e-11)).run(t) for t in times]
+    runs = [AdjointSolver(executable, Cvodes(relative_tolerance=1e-11)).run(t) for t in times]
     np.testing.assert_allclose(result.variance[:, :, 0], [run.variance[:, 0] for run in runs], rtol=1e-7)
 
 
@@ -165,7 +165,7 @@ def test_end_times_do_not_change_each_other(as504):
 
 def test_end_time_at_the_start(as504):
     engine, executable, _ = as504
-    run = AdjointSolver(executable, IntegratorOptions()).run(10.0)
+    run = AdjointSolver(executable, Cvodes()).run(10.0)
     alone = sweep(engine, executable, [10.0])
     first = sweep(engine, executable, [10.0, 10.5, 12.0])
     for result in (alone, first):
@@ -178,7 +178,7 @@ def test_weighting_functions_are_the_adjoint_runs(as504):
     engine, executable, _ = as504
     found = sweep(engine, executable, [40.0, 107.0], relative_tolerance=1e-9, weighting_spacing=0.5).weighting
     assert found is not None
-    options = IntegratorOptions(relative_tolerance=1e-10)
+    options = Cvodes(relative_tolerance=1e-10)
     history = AdjointSolver(executable, options).history(40.0, 0.5)
     inside = found.times <= 40.0
     np.testing.assert_allclose(found.times[inside], history.times)

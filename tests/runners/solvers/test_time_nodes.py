@@ -8,7 +8,7 @@ import pytest
 
 from ascentwind.model import LinearSystem, define_system
 from ascentwind.model.errors import TimeRangeError, UnstableSystemWarning
-from ascentwind.runners import CovarianceOptions, EnsembleOptions, IntegratorOptions, Study, SweepOptions
+from ascentwind.runners import CovarianceEquation, Cvodes, Ensemble, Study, Sweep
 from ascentwind.runners.case.times import parse_times
 from ascentwind.runners.solvers.discretisation import discretise
 from ascentwind.runners.solvers.time_nodes import interval_after, intervals, time_nodes
@@ -16,7 +16,7 @@ from ascentwind.runners.solvers.time_nodes import interval_after, intervals, tim
 RATES = (-1.0, 0.5, -2.0)  # before, between and after the switches
 SWITCHES = (1.0, 3 * 0.7)  # 2.0999999999999996
 END = 3.0
-TIGHT = (SweepOptions(1e-10), IntegratorOptions(relative_tolerance=1e-10), CovarianceOptions(1e-10))
+TIGHT = (Sweep(1e-10), Cvodes(relative_tolerance=1e-10), CovarianceEquation(1e-10))
 NEXT, BEFORE = (lambda t: float(np.nextafter(t, np.inf))), (lambda t: float(np.nextafter(t, -np.inf)))
 
 
@@ -76,7 +76,7 @@ def meant(times) -> list[float]:
 @pytest.mark.parametrize("options", TIGHT, ids=["sweep", "cvodes", "covariance"])
 @pytest.mark.parametrize("times", ODD.values(), ids=list(ODD))
 def test_every_engine_gives_the_closed_form_at_the_time_as_asked(study, times, options):
-    found = study.response_statistics(times, options=options)
+    found = study.response_statistics(times, engine=options)
     np.testing.assert_array_equal(found["time"].values, times)
     expected = [variance(t) for t in meant(times)]
     np.testing.assert_allclose(found.variance.values[:, 0, 0], expected, rtol=2e-8)
@@ -87,7 +87,7 @@ def test_every_engine_gives_the_closed_form_at_the_time_as_asked(study, times, o
 def test_exact_steps_and_simulated_flights_take_the_same_times(study, times):
     steps = discretise(study.executable, list(times), 0.05)
     np.testing.assert_allclose(steps.variance()[:, 0, 0], [variance(t) for t in meant(times)], rtol=1e-9)
-    found = study.response_statistics(times, options=EnsembleOptions(runs=40))
+    found = study.response_statistics(times, engine=Ensemble(runs=40))
     np.testing.assert_array_equal(found["time"].values, times)
     assert (np.diff(found.variance.values[:, 0, 0])[np.diff(meant(times)) == 0] == 0).all()
 
@@ -98,7 +98,7 @@ def test_exact_steps_and_simulated_flights_take_the_same_times(study, times):
 @pytest.mark.parametrize("options", TIGHT, ids=["sweep", "cvodes", "covariance"])
 def test_discontinuities_in_any_order_and_to_a_rounding(order, options):
     with pytest.warns(UnstableSystemWarning):
-        found = Study.from_system(switching(order)).response_statistics([1.7, 2.8], options=options)
+        found = Study.from_system(switching(order)).response_statistics([1.7, 2.8], engine=options)
     np.testing.assert_allclose(found.variance.values[:, 0, 0], [variance(1.7), variance(2.8)], rtol=2e-8)
 
 
@@ -144,7 +144,7 @@ def test_sensitivities_take_neighbours_as_one():
 
 
 def test_batches_take_neighbours_as_one(study):
-    found = study.batch([{}, {}], [1.0, NEXT(1.0), 2.0], options=SweepOptions(1e-9))
+    found = study.batch([{}, {}], [1.0, NEXT(1.0), 2.0], engine=Sweep(1e-9))
     expected = [variance(1.0), variance(1.0), variance(2.0)]
     np.testing.assert_allclose(found.variance.values[:, :, 0, 0], [expected, expected], rtol=1e-7)
 

@@ -11,7 +11,7 @@ import pytest
 
 from ascentwind.model import define_system
 from ascentwind.model.errors import IntegrationError, UnstableSystemWarning
-from ascentwind.runners import CovarianceOptions, IntegratorOptions, Study
+from ascentwind.runners import CovarianceEquation, Cvodes, Study
 from ascentwind.runners.solvers import adjoint
 from ascentwind.runners.solvers.typical_sizes import typical_sizes
 
@@ -138,7 +138,7 @@ def test_growth_beyond_numbers_ends_early_and_quietly(lag, engine, capfd):
     assert capfd.readouterr() == ("", "")
 
 
-@pytest.mark.parametrize("options", [IntegratorOptions, CovarianceOptions])
+@pytest.mark.parametrize("options", [Cvodes, CovarianceEquation])
 @pytest.mark.parametrize("part", [0.0, -1.0, 2.0, float("nan")])
 def test_absolute_parts_that_make_no_sense_are_refused(options, part):
     with pytest.raises(IntegrationError, match="absolute part"):

@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 from ascentwind.model.errors import ParameterValueError, TimeRangeError, UnknownNameError
-from ascentwind.runners import IntegratorOptions, Study
+from ascentwind.runners import Cvodes, Study
 from ascentwind.runners.solvers.covariance import covariance_equation
 from ascentwind.runners.solvers.mean_response import mean_response
 
@@ -23,8 +23,8 @@ def forward(as504):
 def test_adjoint_meets_the_covariance_equation(as504, forward, method, iteration):
     """Another method, another integrator, no adjoint: every response and source to 1e-5, also behind all jumps."""
     tolerance = 1e-9 if method == "bdf" else 1e-8
-    options = IntegratorOptions(method=method, iteration=iteration, relative_tolerance=tolerance)
-    found = as504.response_statistics(TIMES, options=options)
+    options = Cvodes(method=method, iteration=iteration, relative_tolerance=tolerance)
+    found = as504.response_statistics(TIMES, engine=options)
     np.testing.assert_allclose(found.variance.values[:, :, :3], forward.variance, rtol=1e-5)
     np.testing.assert_allclose(found.variance.values[:, :, 3], forward.variance.sum(axis=2), rtol=1e-5)
     np.testing.assert_allclose(found.mean.values[:, :, 0], forward.mean, rtol=1e-5, atol=1e-9)
@@ -37,9 +37,9 @@ def test_the_default_tolerance_keeps_the_promise(as504, forward):
 
 def test_an_end_time_on_a_discontinuity_is_seen_from_the_left(as504):
     """At engine cutoff thrust and axial acceleration jump, and the bending moment with them."""
-    options = IntegratorOptions(relative_tolerance=1e-9)
+    options = Cvodes(relative_tolerance=1e-9)
     at, before, after = (
-        as504.response_statistics([time], options=options).std.sel(response="bending_moment").values
+        as504.response_statistics([time], engine=options).std.sel(response="bending_moment").values
         for time in (134.34, 134.34 - 2e-7, 134.34 + 2e-7)
     )
     np.testing.assert_allclose(at, before, rtol=1e-6)
@@ -155,7 +155,7 @@ def test_parameters_are_listed_changed_and_refused(as504):
 def test_noise_follows_the_mean_response(as504):
     """Thrust and centre-of-pressure noise are proportional to the mean, so to the mean wind."""
     doubled = as504.with_parameters({"wind.mean_scale": 2.0})
-    a, b = (s.response_statistics([70.0], options=IntegratorOptions(relative_tolerance=1e-9)) for s in (as504, doubled))
+    a, b = (s.response_statistics([70.0], engine=Cvodes(relative_tolerance=1e-9)) for s in (as504, doubled))
     np.testing.assert_allclose(b.mean.values, 2 * a.mean.values, rtol=1e-6)
     for source, factor in (("thrust", 4.0), ("center_of_pressure", 4.0), ("wind", 1.0)):
         np.testing.assert_allclose((b.variance / a.variance).sel(source=source), factor, rtol=1e-5)
@@ -173,8 +173,8 @@ def test_times_outside_the_flight_are_refused(as504):
 def test_interpreter_gives_the_same_statistics(as504):
     interpreted = Study.load("as504", compile=False)
     assert (as504.executable.engine, interpreted.executable.engine) == ("compiled", "interpreter")
-    options = IntegratorOptions(relative_tolerance=1e-9)
-    a, b = (s.response_statistics([30.0], options=options) for s in (as504, interpreted))
+    options = Cvodes(relative_tolerance=1e-9)
+    a, b = (s.response_statistics([30.0], engine=options) for s in (as504, interpreted))
     np.testing.assert_allclose(a.variance.values, b.variance.values, rtol=1e-6)
 
 

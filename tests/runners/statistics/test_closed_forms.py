@@ -15,15 +15,15 @@ from ascentwind.model.errors import (
     UnknownNameError,
     UnstableSystemWarning,
 )
-from ascentwind.runners import IntegratorOptions, Study
+from ascentwind.runners import Cvodes, Study
 
-TIGHT = IntegratorOptions(relative_tolerance=1e-10)
+TIGHT = Cvodes(relative_tolerance=1e-10)
 TIMES = (0.5, 2.0, 7.5)
 
 
 def variance(system: LinearSystem, times=TIMES, options=TIGHT) -> np.ndarray:
     """Combined variance of the first response."""
-    return Study.from_system(system).response_statistics(times, options=options).variance.values[:, 0, -1]
+    return Study.from_system(system).response_statistics(times, engine=options).variance.values[:, 0, -1]
 
 
 def lag() -> LinearSystem:
@@ -112,7 +112,7 @@ def test_start_covariance_adds_its_propagated_part():
 
 def test_weighting_function_is_the_closed_form_and_gives_the_variance():
     study = Study.from_system(euler_cauchy())
-    found = study.weighting_function(4.0, spacing=0.01, options=TIGHT)
+    found = study.weighting_function(4.0, spacing=0.01, engine=TIGHT)
     t, g = found["t"].values, found["noise_weighting"].values[0, 0]
     np.testing.assert_allclose(g, euler_cauchy_weight(4.0, t), atol=1e-8)
 
@@ -128,7 +128,7 @@ def test_mean_by_convolution_holds_the_direct_part():
         inputs={"u": (u, ca.sin(t))},
         outputs={"y": x + 3 * u},
     )
-    found = Study.from_system(system).response_statistics(TIMES, options=TIGHT)
+    found = Study.from_system(system).response_statistics(TIMES, engine=TIGHT)
     expected = [0.5 * (np.sin(t2) - np.cos(t2) + np.exp(-t2)) + 3 * np.sin(t2) for t2 in TIMES]
     np.testing.assert_allclose(found.mean.values[:, 0, 0], expected, rtol=1e-8)
 
@@ -143,7 +143,7 @@ def test_sources_are_kept_apart_and_add_up():
         sources={"n1": "a", "n2": "b", "n3": "b"},
         outputs={"x": x},
     )
-    found = Study.from_system(system).response_statistics([2.0], options=TIGHT)
+    found = Study.from_system(system).response_statistics([2.0], engine=TIGHT)
     unit = 0.5 * (1 - np.exp(-4.0))
     assert list(found["source"].values) == ["a", "b", "combined"]
     np.testing.assert_allclose(found.variance.values[0, 0], [unit, 13 * unit, 14 * unit], rtol=1e-8)
@@ -163,7 +163,7 @@ def test_parameters_change_the_numbers_without_new_code():
     other = study.with_parameters({"tau": 0.5})
     assert other.executable.shared_library == study.executable.shared_library
     for s, value in ((study, 2.0), (other, 0.5)):
-        found = s.response_statistics([1.0], options=TIGHT).variance.values[0, 0, 0]
+        found = s.response_statistics([1.0], engine=TIGHT).variance.values[0, 0, 0]
         assert found == pytest.approx(1 - np.exp(-2 / value), rel=1e-8)
 
 

@@ -111,9 +111,9 @@ def test_a_mean_beyond_the_limit_is_told(study):
 
 def test_a_few_runs_are_no_error(study):
     """What sampling explains is not told; a shift beyond it is."""
-    from ascentwind.runners.solvers.ensemble import EnsembleOptions
+    from ascentwind.runners.statistics.ensemble import Ensemble
 
-    found = study.response_statistics(TIMES, options=EnsembleOptions(runs=200, seed=3))
+    found = study.response_statistics(TIMES, engine=Ensemble(runs=200, seed=3))
     check = check_peaks(study, found)
     assert check.agree
     assert 0.05 < check.allowed < 0.3

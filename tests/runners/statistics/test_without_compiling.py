@@ -11,10 +11,10 @@ from ascentwind.codegen.toolchain.compiler import Compiler
 from ascentwind.codegen.toolchain.library import NoCompilerError
 from ascentwind.runners import Study
 from ascentwind.runners.parameter_study import run_parameter_study
-from ascentwind.runners.solvers.ensemble import EnsembleOptions
-from ascentwind.runners.solvers.integration import IntegratorOptions
-from ascentwind.runners.solvers.sweep import SweepOptions
-from ascentwind.runners.statistics.engines import engine_options
+from ascentwind.runners.statistics.cvodes import Cvodes
+from ascentwind.runners.statistics.engines import engine_from
+from ascentwind.runners.statistics.ensemble import Ensemble
+from ascentwind.runners.statistics.sweep import Sweep
 
 
 @pytest.fixture
@@ -52,17 +52,17 @@ def test_questions_without_an_engine_are_answered(interpreted):
     assert interpreted.second_derivatives("x", 3.0, ["gain"])["second_derivative"].item() == pytest.approx(0, abs=1e-9)
     assert "noise_weighting" in interpreted.weighting_function(3.0)
     assert interpreted.with_parameters({"gain": 1.0}).response_statistics([3.0]).attrs["engine"] == "cvodes"
-    assert interpreted.response_statistics([3.0], options=IntegratorOptions()).attrs["code"] == "interpreter"
+    assert interpreted.response_statistics([3.0], engine=Cvodes()).attrs["code"] == "interpreter"
 
 
 @pytest.mark.parametrize(
     ("ask", "refusal"),
     [
         (lambda s, _: s.response_statistics([3.0], engine="sweep"), NoCompilerError),
-        (lambda s, _: s.response_statistics([3.0], options=SweepOptions()), NoCompilerError),
+        (lambda s, _: s.response_statistics([3.0], engine=Sweep()), NoCompilerError),
         (lambda s, _: s.response_statistics([3.0], engine="ensemble"), EnsembleNeedsCompilerError),
-        (lambda s, _: s.response_statistics([3.0], options=EnsembleOptions()), EnsembleNeedsCompilerError),
-        (lambda s, _: s.batch([{}], [3.0], options=SweepOptions()), NoCompilerError),
+        (lambda s, _: s.response_statistics([3.0], engine=Ensemble()), EnsembleNeedsCompilerError),
+        (lambda s, _: s.batch([{}], [3.0], engine=Sweep()), NoCompilerError),
         (lambda s, _: s.batch([{}], [3.0], threads=1), NoCompilerError),
         (lambda s, _: s.weighting_functions([3.0]), NoCompilerError),
         (
@@ -79,9 +79,9 @@ def test_what_needs_a_compiler_refuses(interpreted, tmp_path, ask, refusal):
 
 
 def test_a_tolerance_alone_leaves_the_choice():
-    assert engine_options(None, relative_tolerance=1e-6) == ("sweep", SweepOptions(1e-6))
-    assert engine_options(None, compiled=False, relative_tolerance=1e-6)[0] == "cvodes"
-    assert engine_options("sweep", compiled=False, relative_tolerance=1e-6)[0] == "sweep"
+    assert engine_from(None, relative_tolerance=1e-6) == Sweep(1e-6)
+    assert engine_from(None, compiled=False, relative_tolerance=1e-6) == Cvodes(relative_tolerance=1e-6)
+    assert engine_from("sweep", compiled=False, relative_tolerance=1e-6) == Sweep(1e-6)
 
 
 @pytest.mark.filterwarnings("ignore:wind filter")  # AS-504's ends at 30 km

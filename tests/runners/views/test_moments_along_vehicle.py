@@ -14,8 +14,8 @@ from ascentwind.model.files.csv_table import read_csv_table
 from ascentwind.model.vehicle.columns import REACTION, along_columns, local_columns, local_load_columns
 from ascentwind.model.vehicle.shipped import built_in_vehicles
 from ascentwind.runners import Study
-from ascentwind.runners.solvers.covariance import CovarianceOptions
-from ascentwind.runners.solvers.sweep import SweepOptions
+from ascentwind.runners.statistics.covariance import CovarianceEquation
+from ascentwind.runners.statistics.sweep import Sweep
 from ascentwind.runners.views.moments_along_vehicle import moments_along_vehicle
 
 ALONG = "loads_along_vehicle.csv"
@@ -90,9 +90,9 @@ def test_every_station_is_the_moment_that_is_an_output_there(folder, options, no
     """Sources, means and times alike: the congruence of one run is the run of each moment."""
     changes = {f"options.{name}": True for name in options} | {"options.noise_loads": noise_loads}
     study = Study.load(folder, changes=changes)
-    tight = SweepOptions(relative_tolerance=1e-10)
-    along = moments_along_vehicle(study, TIMES, slosh_reaction="slosh_reaction" in options, options=tight)
-    direct = study.response_statistics(TIMES, responses=list(STATIONS), options=tight)
+    tight = Sweep(relative_tolerance=1e-10)
+    along = moments_along_vehicle(study, TIMES, slosh_reaction="slosh_reaction" in options, engine=tight)
+    direct = study.response_statistics(TIMES, responses=list(STATIONS), engine=tight)
     for quantity in ("std", "mean_plus_3sigma"):
         expected = direct[quantity].transpose("time", "response", "source").values
         np.testing.assert_allclose(along[quantity].values, expected, rtol=1e-9)
@@ -102,7 +102,7 @@ def test_every_station_is_the_moment_that_is_an_output_there(folder, options, no
 
 def test_covariance_equation_gives_the_same_without_a_compiler(folder):
     study = Study.load(folder, compile=False)
-    along = moments_along_vehicle(study, TIMES[:1], options=CovarianceOptions(1e-7))
+    along = moments_along_vehicle(study, TIMES[:1], engine=CovarianceEquation(1e-7))
     sweep = moments_along_vehicle(Study.load(folder), TIMES[:1])
     np.testing.assert_allclose(along["std"].values, sweep["std"].values, rtol=1e-5)
 
