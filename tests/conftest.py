@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 from filelock import FileLock
+from threadpoolctl import threadpool_limits
 
 from ascentwind.model.vehicle.shipped import built_in_vehicles
 from ascentwind.model.wind.statistics import WindStatistics
@@ -42,6 +43,14 @@ def cache(shared_folder):
         folder.chmod(0o700)
         patch.setenv("ASCENTWIND_CACHE", str(folder))
         yield folder
+
+
+@pytest.fixture(scope="session", autouse=True)
+def one_thread_a_worker():
+    """Workers share the cores, and on two threads the products of small matrices take five times the processor time."""
+    with pytest.MonkeyPatch.context() as patch, threadpool_limits(1, user_api="blas"):
+        patch.setenv("OPENBLAS_NUM_THREADS", "1")  # of processes that tests start
+        yield
 
 
 @pytest.fixture(scope="session")

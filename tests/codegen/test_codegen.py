@@ -74,6 +74,7 @@ def test_jacobian_for_the_implicit_method_is_the_derivative(as504):
         np.testing.assert_allclose(J, np.hstack(columns), atol=1e-11 * np.abs(J).max())
 
 
+@pytest.mark.slow
 def test_the_same_bytes_from_two_processes():
     code = (
         "from ascentwind.runners import Study; from ascentwind.runners.cli.regenerate import generated_files;"

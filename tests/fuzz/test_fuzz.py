@@ -19,6 +19,8 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+import pytest
+
 from ascentwind.runners.solvers.cores import available_cores
 
 GOOD = ("refused", "warned", "unchanged", "legitimate", "not applicable")
@@ -27,6 +29,7 @@ SILENCE = 300.0  # s without a line: a hang
 FOLDER = Path(__file__).parent
 
 
+@pytest.mark.slow
 def test_no_mistake_ends_badly(cache):
     wanted = os.environ.get("ASCENTWIND_FUZZ_CASES")
     cases = int(wanted or 1000)

@@ -127,6 +127,7 @@ def test_gains_of_zero_change_nothing(relief, as504):
     np.testing.assert_allclose(found["mean"].values, expected["mean"].values, rtol=1e-7, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_engines_agree_with_the_sensors_on(relief):
     study = relief.with_parameters(GAINS)
     found = {e: study.response_statistics([75.0], engine=e) for e in ("sweep", "cvodes", "covariance")}

@@ -163,6 +163,7 @@ def test_thrust_enters_every_form_but_the_reports(models):
         assert deviation_columns(models[form], "thrust")[2] - reported == pytest.approx(direct, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_bounds_at_75_s_are_those_of_an_independent_estimate():
     """Found before these equations, from forces forward of the station: 1.49 to 1.51 MN m, 1.30 as reported, +1.3 %.
 
@@ -248,6 +249,7 @@ def test_deviations_that_a_moment_cannot_follow_are_refused(tables, why):
 
 @pytest.mark.parametrize("source", ["thrust", "center_of_pressure"])
 @pytest.mark.parametrize("form", FORMS)
+@pytest.mark.slow
 def test_white_noise_of_a_rigid_vehicle_reaches_the_moment_directly(vehicle_folder, source, form):
     """Without modes and tanks nothing else brings it there: infinite, and refused, in every form but the report's."""
     make_rigid(vehicle_folder)
@@ -262,6 +264,7 @@ def test_white_noise_of_a_rigid_vehicle_reaches_the_moment_directly(vehicle_fold
 
 
 @pytest.mark.parametrize("form", FORMS)
+@pytest.mark.slow
 def test_variance_of_a_rigid_moment_is_the_square_of_its_load(vehicle_folder, form):
     """Closed form: at the start a deviation has its full variance and no time to turn the vehicle."""
     make_rigid(vehicle_folder)

@@ -264,6 +264,7 @@ def test_names_without_a_station(file):
 
 @settings(max_examples=10, deadline=None, suppress_health_check=(HealthCheck.too_slow,))
 @given(factor=st.floats(0.92, 1.08), vehicle=st.sampled_from(sorted(SHIPPED)))
+@pytest.mark.slow
 def test_heavier_vehicles_with_more_of_everything_pass(tmp_path_factory, factor, vehicle):
     """Mass, inertia, thrust and drag in proportion: the same flight."""
     folder = copied(vehicle, tmp_path_factory.mktemp("scaled"))

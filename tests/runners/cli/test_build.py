@@ -31,6 +31,7 @@ def ascentwind(monkeypatch, capsys, tmp_path):
     return run
 
 
+@pytest.mark.slow
 def test_build_vehicle_writes_a_folder_that_runs_and_figures(ascentwind, tmp_path):
     code, printed, _ = ascentwind("build-vehicle", "as504", "--out", "mine", "--spacing", "10")
     assert code == 0
@@ -50,6 +51,7 @@ def test_build_vehicle_refuses_with_exit_code_2(ascentwind, tmp_path):
     assert code == 2 and "nowhere" in errors and "Traceback" not in errors
 
 
+@pytest.mark.slow
 def test_run_along_vehicle_leaves_files_with_the_peak(ascentwind, tmp_path):
     code, _, _ = ascentwind("run", "as504", "--times", "70:80:5", "--out", "found", "--along-vehicle", "75")
     assert code == 0

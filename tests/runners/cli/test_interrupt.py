@@ -71,7 +71,7 @@ def ended_processes() -> float:
     return usage.ru_utime + usage.ru_stime
 
 
-@pytest.mark.parametrize("moment", [0.3, 2.0, 3.5])
+@pytest.mark.parametrize("moment", [0.3, *(pytest.param(m, marks=pytest.mark.slow) for m in (2.0, 3.5))])
 @pytest.mark.parametrize("command", COMMANDS)
 def test_commands_end_at_once(command, moment, tmp_path):
     process = start(COMMANDS[command], tmp_path)
@@ -107,6 +107,7 @@ def test_compiler_under_way_is_ended(tmp_path):
     assert not [p for p in cache.iterdir() if p.is_dir()]
 
 
+@pytest.mark.slow
 def test_interrupted_study_keeps_its_chunks(tmp_path):
     process = start(COMMANDS["study"], tmp_path)
     chunks = tmp_path / "as504_dispersion-results" / "chunks"

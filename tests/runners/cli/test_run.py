@@ -60,6 +60,7 @@ def test_run_writes_tables_and_figures(ascentwind, tmp_path, as504):
     )
 
 
+@pytest.mark.slow
 def test_sensitivity_ranks_and_writes(ascentwind, tmp_path, as504):
     printed = ascentwind("sensitivity", "as504", "--time", "40", "--quantity", "std", "--out", "found")
     expected = as504.sensitivity("bending_moment", 40.0)
@@ -106,11 +107,13 @@ def test_new_vehicle_is_a_vehicle_of_its_own(ascentwind, tmp_path):
     assert "as504" in ascentwind("vehicles")
 
 
+@pytest.mark.slow
 def test_regenerate_writes_and_then_leaves_alone(ascentwind):
     assert ascentwind("regenerate", "as504", "--out", "c").count("written (new)") == 5
     assert ascentwind("regenerate", "as504", "--out", "c").count("unchanged") == 5
 
 
+@pytest.mark.slow
 def test_regenerate_says_what_changed(ascentwind, tmp_path, vehicle_folder, edit):
     ascentwind("regenerate", str(vehicle_folder), "--out", "c")
     edit("extra_outputs = []", 'extra_outputs = ["lateral_drift"]')

@@ -39,6 +39,7 @@ def columns(file: Path):
     return read_csv_table(file, "time", "s", order="not decreasing").columns
 
 
+@pytest.mark.slow
 def test_shipped_tables_are_the_output_of_the_build(built):
     """Every table that vehicle.toml names and no hand wrote; digits are nine, sums of other processors another 1e-8."""
     _, out, written, steps = built
@@ -57,6 +58,7 @@ def test_shipped_tables_are_the_output_of_the_build(built):
     load_vehicle(out)
 
 
+@pytest.mark.slow
 def test_loads_of_as504_meet_those_of_as506_in_flight(built):
     """Station 25 m at AS-506's alpha 1.7 deg, gimbal 0.27 deg, 33.0 kPa, 91.5 s: 3.75e6 N m (its flight evaluation)."""
     numbers, _, _, _ = built
@@ -68,6 +70,7 @@ def test_loads_of_as504_meet_those_of_as506_in_flight(built):
     assert moment == pytest.approx(3.75e6, rel=0.05)
 
 
+@pytest.mark.slow
 def test_forces_of_the_line_are_those_of_the_tables(built):
     """Normal force and its centre agree exactly; mass moments but for 60 t elements, misplaced by 0.1 m."""
     numbers, _, _, _ = built
@@ -81,6 +84,7 @@ def test_forces_of_the_line_are_those_of_the_tables(built):
     np.testing.assert_allclose([c.second_moment[0] for c in numbers.loads], p.moment_of_inertia, rtol=5e-4)
 
 
+@pytest.mark.slow
 def test_moments_vanish_at_both_ends_of_as504(built):
     numbers, _, _, _ = built
     for c in numbers.loads[::20]:
@@ -89,6 +93,7 @@ def test_moments_vanish_at_both_ends_of_as504(built):
             assert np.abs(values[:, [0, -1]]).max() < 1e-9 * np.abs(values).max(), name
 
 
+@pytest.mark.slow
 def test_stations_along_the_vehicle_hold_the_loads_that_are_outputs(built):
     """The row of station 25 m along the vehicle is the load's own table, digit by digit."""
     _, out, _, _ = built
@@ -102,6 +107,7 @@ def test_stations_along_the_vehicle_hold_the_loads_that_are_outputs(built):
         assert table.argument[0] <= vehicle.start
 
 
+@pytest.mark.slow
 def test_in_place_build_is_the_same_and_replaces_whole_files(tmp_path):
     first, second = tmp_path / "first", tmp_path / "second"
     build_vehicle(AS504, first, spacing=COARSE)
@@ -153,6 +159,7 @@ def test_sensor_beyond_the_tip_is_refused(folder):
         build_vehicle(folder, spacing=COARSE)
 
 
+@pytest.mark.slow
 def test_modes_at_a_sensor_are_those_of_the_tank_beside_it(built):
     """The accelerometer is 0.1 m from the attach point of S-II LOX, as far as the bending tables' slope reaches."""
     numbers, out, _, _ = built
@@ -193,6 +200,7 @@ def test_unwritable_and_full_folders_are_refused(folder, tmp_path):
         build_vehicle(AS504, tmp_path / "file" / "vehicle")
 
 
+@pytest.mark.slow
 def test_figures_show_every_panel_with_a_label_and_data(built):
     numbers, _, _, _ = built
     for name, draw in FIGURES.items():

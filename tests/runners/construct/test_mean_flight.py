@@ -103,6 +103,7 @@ def test_atmosphere_is_the_standard_times_its_factors():
         np.testing.assert_allclose([float(v) for v in values(altitude)], expected, rtol=2e-5)
 
 
+@pytest.mark.slow
 def test_flight_equals_an_integration_in_the_turning_frame(construction, flight):
     """Same physics by another road: Earth-fixed axes with Coriolis and centrifugal force, alpha as an angle, DOP853."""
     c, site = construction, construction.site

@@ -45,6 +45,7 @@ def flight(construction) -> MeanFlight:
     return fly(construction)
 
 
+@pytest.mark.slow
 def test_tables_are_the_output_of_the_build(tmp_path):
     _, written = build_vehicle(FOLDER, tmp_path / "falcon1")
     tables = {p.name for p in FOLDER.glob("*.csv")} - {"control_gains.csv", "wind_march_meridional.csv"}
@@ -60,6 +61,7 @@ def forward(falcon1):
 
 
 @pytest.mark.parametrize("engine", ["sweep", "cvodes"])
+@pytest.mark.slow
 def test_engines_meet_the_covariance_equation(falcon1, forward, engine):
     """Moments of 10 to 100 kN m to the accuracy that AS-504's have at 10 MN m: each source, and the mean."""
     found = falcon1.response_statistics(TIMES, engine=engine)

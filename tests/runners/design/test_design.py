@@ -167,6 +167,7 @@ def test_three_sigma_of_both_signs_holds_the_peak_of_the_magnitude(as504):
     assert stats["mean"].values[1, 0] < 0  # the sign matters at 95 s
 
 
+@pytest.mark.slow
 def test_as504_design_is_stationary_and_no_neighbour_is_better(problem, designed):
     assert designed.converged
     assert designed.stationarity.residual <= 1e-6
@@ -200,6 +201,7 @@ def test_multiplier_is_what_a_looser_limit_gains(lag):
     assert total == pytest.approx(gained, rel=5e-3)
 
 
+@pytest.mark.slow
 def test_cvodes_confirms_the_design(designed):
     verified = verify_design(designed)
     assert {v.response for v in verified} == {"bending_moment", "engine_angle"}

@@ -45,6 +45,7 @@ def workers(cache):
         yield started
 
 
+@pytest.mark.slow
 def test_bytes_are_those_of_this_machine(as504, workers, tmp_path):
     changed = as504.with_parameters({"control.T1.gain": 1.05})  # travels with the vehicle
     here = run_parameter_study(PLAN, tmp_path / "here", study=changed)
@@ -63,6 +64,7 @@ def deadly(study, task, chunk):
 
 
 @pytest.mark.parametrize("together", [1, 2], ids=["chunk by chunk", "both chunks in a task"])
+@pytest.mark.slow
 def test_a_member_that_kills_its_worker_costs_no_other(as504, workers, monkeypatch, together):
     monkeypatch.setattr(cluster, "together", lambda *_: together)
     plan = read_plan(PLAN)
@@ -86,6 +88,7 @@ def test_a_member_that_kills_its_worker_costs_no_other(as504, workers, monkeypat
     assert (found[10].variance[kept] == whole.variance[kept]).all()
 
 
+@pytest.mark.slow
 def test_a_worker_killed_from_outside_is_replaced(as504, workers, tmp_path):
     with Client(workers.scheduler_address, set_as_default=False) as client:
         client.run_on_scheduler(lambda dask_scheduler: setattr(dask_scheduler, "allowed_failures", 3))
@@ -169,6 +172,7 @@ def test_a_scheduler_without_workers(as504, tmp_path, monkeypatch):
         run_parameter_study(PLAN, tmp_path, study=as504, scheduler=empty.scheduler_address)
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_goes_away(as504, tmp_path):
     started = LocalCluster(n_workers=1, threads_per_worker=1, processes=True, dashboard_address=":0")
 

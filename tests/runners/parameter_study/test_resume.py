@@ -54,6 +54,7 @@ def stored(folder: Path) -> dict[str, tuple[int, int]]:
     return {p.name: (p.stat().st_ino, p.stat().st_mtime_ns) for p in (folder / "chunks").glob("[0-9]*.nc")}
 
 
+@pytest.mark.slow
 def test_killed_at_random_moments_it_ends_with_the_same_bytes(study, tmp_path):
     run_parameter_study(PLAN, tmp_path / "whole", study=study)
     expected = (tmp_path / "whole" / "study.nc").read_bytes()

@@ -49,6 +49,7 @@ def shifted(tmp_path_factory):
 
 
 @pytest.mark.parametrize("quantity", ["std", "mean"])
+@pytest.mark.slow
 def test_first_order_change_of_a_construction_is_the_central_difference(shifted, quantity):
     """Normal force and its place change four kinds of tables at once."""
     step, before, here, after = shifted
@@ -60,6 +61,7 @@ def test_first_order_change_of_a_construction_is_the_central_difference(shifted,
     assert first_order == pytest.approx(difference, rel=1e-4)
 
 
+@pytest.mark.slow
 def test_first_order_change_of_wind_and_parameters_is_the_central_difference(as504):
     found = as504.sensitivity("bending_moment", 70.0, source="wind", quantity="std", elasticity=False)
     wind = as504.vehicle.wind.shaping_filter
@@ -73,6 +75,7 @@ def test_first_order_change_of_wind_and_parameters_is_the_central_difference(as5
     assert first_order == pytest.approx(np.diff([moment(study, "std") for study in moved])[0], rel=1e-4)
 
 
+@pytest.mark.slow
 def test_first_order_change_of_the_mean_wind_reaches_what_the_noises_multiply(as504):
     """A factor on the mean wind changes the mean, and through it the spread by thrust and centre of pressure."""
     found = as504.sensitivity("bending_moment", 70.0, quantity="mean_plus_3sigma", elasticity=False)
@@ -141,6 +144,7 @@ def test_page_says_what_was_missed_and_what_is_at_a_bound(as504):
     assert "σ of the bending moment" not in text[text.index("Cannot be met") :].split("What each")[0]
 
 
+@pytest.mark.slow
 def test_page_in_the_docs_holds_the_present_numbers(as504):
     """Stale if the vehicle changed since: write it anew with 'ascentwind reproduce'."""
     found = responses(as504.response_statistics(end_times(as504)))

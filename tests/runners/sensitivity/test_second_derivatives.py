@@ -59,6 +59,7 @@ def test_closed_form(driven, quantity):
     assert d.attrs["asymmetry"] < 1e-12
 
 
+@pytest.mark.slow
 def test_as504_against_differences_of_the_first(as504):
     """Through the networks, the noise columns and the mean."""
     names = ["control.T1.gain", "center_of_pressure.sigma", "wind.mean_scale"]

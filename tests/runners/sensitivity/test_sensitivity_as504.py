@@ -32,6 +32,7 @@ def test_collocation_meets_cvodes(as504, at_75):
     assert at_75.attrs["mean"] == pytest.approx(run.mean[0], rel=1e-8)
 
 
+@pytest.mark.slow
 def test_every_parameter_against_differences_of_the_same_discretisation(as504):
     """From wind alone, which no mean enters: rounding is all that stands between, so that small ones count too."""
 
@@ -56,6 +57,7 @@ def test_every_parameter_against_differences_of_the_same_discretisation(as504):
     assert checked >= 30
 
 
+@pytest.mark.slow
 def test_parameters_and_rows_against_differences_of_cvodes(as504):
     """Another integrator and no gradient; the centre of pressure's noise is there through the mean response."""
     d = as504.check_sensitivity(
@@ -71,6 +73,7 @@ def test_parameters_and_rows_against_differences_of_cvodes(as504):
     assert (abs(d["uncertainty"]) <= 1e-4 * abs(d["difference"])).all()
 
 
+@pytest.mark.slow
 def test_the_mean_path_against_differences_of_cvodes(as504):
     """The variance by centre-of-pressure noise follows the mean wind only through the mean response."""
     d = as504.check_sensitivity(

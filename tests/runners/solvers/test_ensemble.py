@@ -131,6 +131,7 @@ def coverage(study: Study, times, std, mean, seeds) -> float:
     return float(np.mean(inside))
 
 
+@pytest.mark.slow
 def test_twenty_thousand_runs_contain_the_closed_form(study):
     times = np.array([0.5, 3.0])
     x, y = lag_variance(times), oscillator_variance(times)
@@ -141,6 +142,7 @@ def test_twenty_thousand_runs_contain_the_closed_form(study):
     assert coverage(study, times, 1.03 * std, mean, range(2)) < 0.75
 
 
+@pytest.mark.slow
 def test_twenty_thousand_runs_contain_the_adjoint_of_as504(as504):
     times = [30.0, 75.0, 110.0]
     adjoint = as504.response_statistics(times, engine="cvodes")

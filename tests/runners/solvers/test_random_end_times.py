@@ -39,12 +39,14 @@ def furthest(study: Study, times: list[float]) -> float:
 
 
 @pytest.mark.filterwarnings("ignore::ascentwind.model.errors.UnstableSystemWarning")
+@pytest.mark.slow
 def test_random_grids_on_a_switching_system(cache):
     study, random = Study.from_system(switching()), np.random.default_rng(504)
     grids = [random_grid(random, 0.0, 3.0, list(SWITCHES)) for _ in range(GRIDS)]
     assert max(furthest(study, grid) for grid in grids) < AGREEMENT
 
 
+@pytest.mark.slow
 def test_random_grids_on_a_vehicle(as504):
     """Only end times beside switches, of which CVODES takes a run each."""
     random = np.random.default_rng(505)

@@ -89,6 +89,7 @@ def oscillator_chain(count):
     )
 
 
+@pytest.mark.slow
 def test_agrees_with_cvodes_and_the_covariance_equation_at_ten_times(as504, reference):
     engine, executable, _ = as504
     result = sweep(engine, executable, TEN, relative_tolerance=1e-10)
@@ -99,6 +100,7 @@ def test_agrees_with_cvodes_and_the_covariance_equation_at_ten_times(as504, refe
 
 
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-6])
+@pytest.mark.slow
 def test_tolerance_is_met_and_the_estimate_covers_the_error(as504, reference, tolerance):
     engine, executable, _ = as504
     result = sweep(engine, executable, TEN, relative_tolerance=tolerance)
@@ -111,6 +113,7 @@ def test_tolerance_is_met_and_the_estimate_covers_the_error(as504, reference, to
 
 
 @pytest.mark.parametrize("source", ["wind", "thrust"])
+@pytest.mark.slow
 def test_agrees_with_the_covariance_equation(as504, source):
     engine, executable, _ = as504
     system = executable.system

@@ -20,6 +20,7 @@ def forward(as504):
 
 
 @pytest.mark.parametrize(("method", "iteration"), [("adams", "newton"), ("bdf", "newton"), ("adams", "functional")])
+@pytest.mark.slow
 def test_adjoint_meets_the_covariance_equation(as504, forward, method, iteration):
     """Another method, another integrator, no adjoint: every response and source to 1e-5, also behind all jumps."""
     tolerance = 1e-9 if method == "bdf" else 1e-8

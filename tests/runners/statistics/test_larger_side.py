@@ -188,6 +188,7 @@ COMMANDS = {
 
 
 @pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.slow
 def test_mirroring_the_mean_wind_changes_no_headline(command, as504, tmp_path, monkeypatch):
     mirrored = as504.with_parameters({"wind.mean_scale": -as504.parameters["wind.mean_scale"].value})
     headlines = []

@@ -184,6 +184,7 @@ def test_a_run_says_that_cvodes_agrees(ascentwind, tmp_path):
     assert (ResponseStatistics.open(tmp_path / "found")["peak_difference"] < 1e-5).all()
 
 
+@pytest.mark.slow
 def test_a_run_by_cvodes_is_held_against_the_covariance_equation(ascentwind, tmp_path):
     code, out, _ = ascentwind(*RUN, "--engine", "cvodes")
     assert code == 0
@@ -191,6 +192,7 @@ def test_a_run_by_cvodes_is_held_against_the_covariance_equation(ascentwind, tmp
     assert ResponseStatistics.open(tmp_path / "found").attrs["peak_reference"] == "covariance"
 
 
+@pytest.mark.slow
 def test_a_run_that_disagrees_ends_with_code_1_and_keeps_its_files(ascentwind, tmp_path, monkeypatch):
     whole = AdjointSolver._result
 
@@ -208,6 +210,7 @@ def test_a_run_that_disagrees_ends_with_code_1_and_keeps_its_files(ascentwind, t
     assert (ResponseStatistics.open(tmp_path / "found")["peak_std_difference"] > LIMIT).all()
 
 
+@pytest.mark.slow
 def test_a_run_whose_check_fails_keeps_its_files(ascentwind, tmp_path, monkeypatch):
     def gives_up(*_):
         raise IntegrationError("the integrator gave up")

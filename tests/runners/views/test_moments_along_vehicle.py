@@ -86,6 +86,7 @@ def folder(tmp_path_factory) -> Path:
         ((), "as_reported"),
     ],
 )
+@pytest.mark.slow
 def test_every_station_is_the_moment_that_is_an_output_there(folder, options, noise_loads):
     """Sources, means and times alike: the congruence of one run is the run of each moment."""
     changes = {f"options.{name}": True for name in options} | {"options.noise_loads": noise_loads}

@@ -69,6 +69,7 @@ def test_high_pass_takes_out_what_the_soundings_hold():
     assert spectrum(above, 5000.0, high) == pytest.approx(spectrum(whole, 5000.0, high), rel=0.01)
 
 
+@pytest.mark.slow
 def test_sum_of_filters_adds_variances_and_correlates_on_request(march):
     large, _ = march
     small = turbulence_filter(altitude=(0.0, 20000.0))
@@ -97,6 +98,7 @@ def test_bad_turbulence(arguments, error, says):
         turbulence_filter(**arguments)
 
 
+@pytest.mark.slow
 def test_two_components_have_the_intralevel_correlation(fit):
     both = shipped_two_components()
     zonal, meridional = (fit(s).shaping_filter for s in (both.zonal, both.meridional))
@@ -219,6 +221,7 @@ def test_filters_survive_their_file(tmp_path, march):
         read_filter(tmp_path / "none.json")
 
 
+@pytest.mark.slow
 def test_fitted_filter_moves_the_bending_variance_by_less_than_one_percent(as504_closed_form):
     """Against the closed form it was fitted to."""
     statistics = shipped_statistics(top=30000.0, third_order=True)
@@ -294,6 +297,7 @@ def test_vehicle_takes_a_filter_file(vehicle_folder, march):
             found(changed)
 
 
+@pytest.mark.slow
 def test_shipped_filter_is_the_fit_it_says(as504):
     """The command in the file, run again, gives its covariances; against the data by the engine, not the fit."""
     shipped = as504.vehicle.wind.shaping_filter

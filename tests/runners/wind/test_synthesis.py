@@ -89,6 +89,7 @@ def test_compiled_and_interpreted_engine_agree():
     assert one == pytest.approx(other, rel=1e-8)
 
 
+@pytest.mark.slow
 def test_two_noises_fit_at_least_as_well(fit):
     s = shipped_statistics()
     one, two = fit(s), synthesise(s, noises=2)
@@ -133,6 +134,7 @@ def test_linear_regression_is_poor_as_the_report_found():
         assert result.share_inside() < 0.5
 
 
+@pytest.mark.slow
 def test_parameter_optimisation_goes_below_the_reports_20():
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", StalledFitWarning)
@@ -142,6 +144,7 @@ def test_parameter_optimisation_goes_below_the_reports_20():
     assert result.rms_error < common < 164
 
 
+@pytest.mark.slow
 def test_appendix_c_search_costs_more_than_least_squares():
     s = shipped_statistics("july", "zonal", top=8000.0)
     squares = synthesise(s, "constrained-response")
