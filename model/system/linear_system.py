@@ -205,6 +205,14 @@ class LinearSystem:
     def block(self, name: str) -> slice:
         """Return where the states of a block stand in x, such as those of the wind filter ('wind').
 
+        Parameters
+        ----------
+        name : str
+
+        Returns
+        -------
+        slice
+
         Raises
         ------
         UnknownNameError

@@ -104,6 +104,15 @@ class ResponseStatistics:
     def sel(self, **labels: Any) -> ResponseStatistics:
         """Return the statistics at labels, as xarray selects: ``sel(response="bending_moment", time=75)``.
 
+        Parameters
+        ----------
+        **labels
+            By dimension: times in s, names of responses and sources.
+
+        Returns
+        -------
+        ResponseStatistics
+
         Raises
         ------
         UnknownNameError
@@ -135,6 +144,10 @@ class ResponseStatistics:
         response : str
         title : str, optional
 
+        Returns
+        -------
+        matplotlib.figure.Figure
+
         Raises
         ------
         UnknownNameError
@@ -157,7 +170,17 @@ class ResponseStatistics:
         return frame[[*first, *others, "time", "response", "unit", "source", *QUANTITIES]]
 
     def save(self, folder: str | Path) -> list[Path]:
-        """Write ``statistics.nc`` and ``statistics.csv`` and return where they are.
+        """Write ``statistics.nc`` and ``statistics.csv``.
+
+        Parameters
+        ----------
+        folder : str or path
+            Made where it is not there.
+
+        Returns
+        -------
+        list of Path
+            Where they are.
 
         Raises
         ------
@@ -174,6 +197,10 @@ class ResponseStatistics:
         ----------
         path : str or path
             ``statistics.nc`` or its folder.
+
+        Returns
+        -------
+        ResponseStatistics
 
         Raises
         ------
