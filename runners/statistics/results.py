@@ -167,7 +167,7 @@ class ResponseStatistics:
         frame = found[list(QUANTITIES)].to_dataframe().reset_index()
         first = ["member"] if "member" in found.dims else []
         others = [c for c in frame.columns if c not in (*first, "time", "response", "unit", "source", *QUANTITIES)]
-        return frame[[*first, *others, "time", "response", "unit", "source", *QUANTITIES]]
+        return frame.loc[:, [*first, *others, "time", "response", "unit", "source", *QUANTITIES]]
 
     def save(self, folder: str | Path) -> list[Path]:
         """Write ``statistics.nc`` and ``statistics.csv``.

@@ -106,7 +106,7 @@ def measure(
             start = clock.perf_counter()
             statistics = finer.compute(case, times, list(case.system.output_names))
             seconds = clock.perf_counter() - start
-            error = float(relative_difference(statistics.std.values, reference).max())
+            error = float(relative_difference(statistics["std"].values, reference).max())
             found.append(Measurement(label, tolerance, error, seconds))
         if progress:
             progress(tolerance)

@@ -199,7 +199,7 @@ def test_what_a_dataset_had_still_works_and_says_where_it_went(statistics):
 
 
 def test_what_is_printed_fits_a_screen(as504, statistics, cache):
-    batch = ResponseStatistics(xr.concat(40 * [statistics.dataset], "member", data_vars="all"))
+    batch = ResponseStatistics(statistics.dataset.expand_dims(member=40))
     for shown in (as504, statistics, batch, lag()):
         text, page = repr(shown), shown._repr_html_()
         assert len(text) < 2500
