@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,6 +20,7 @@ from scipy.interpolate import CubicSpline, PchipInterpolator, PPoly
 from .errors import DataError
 
 ORDER = 4  # coefficients of a cubic
+Kind = Literal["given", "mean"]  # of a group of tables
 INTERPOLATIONS = ("cubic", "pchip", "linear", "step")
 
 
@@ -134,6 +136,8 @@ class TableGroup:
         Beyond the first and last knot the value there is held.
     coefficients : (k - 1, 4, m) array
         Interval, power 0 to 3 of (argument - left knot), table.
+    kind : {'given', 'mean'}
+        Numbers of a vehicle and its wind, or the mean response, which follows from them and is zero until computed.
     """
 
     name: str
@@ -142,6 +146,7 @@ class TableGroup:
     units: tuple[str, ...]
     knots: NDArray[np.float64]
     coefficients: NDArray[np.float64]
+    kind: Kind = "given"
 
     def __post_init__(self):
         k, m = self.knots.size, len(self.names)

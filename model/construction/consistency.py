@@ -108,7 +108,7 @@ def _refuse_twice(key: str, what: str, values: Iterable[Hashable], cure: str = "
         seen.add(value)
 
 
-def _refuse_same(key: str, parts: dict[str, Hashable]) -> None:
+def _refuse_same(key: str, parts: Mapping[str, Hashable]) -> None:
     names: dict[Hashable, str] = {}
     for name, part in parts.items():
         if part in names:

@@ -50,7 +50,8 @@ def deviated(vehicle: Vehicle, numbers: Numbers, motion: Motion, equations: Unde
         rates += column[:n] * process.deviation
         outputs += column[n:] * process.deviation
     angles = ca.vertcat(motion.alpha, motion.beta, equations.moved)
-    return tuple(ca.substitute([rates, outputs], [angles], [ca.vertcat(equations.angles, 0)]))
+    rates, outputs = ca.substitute([rates, outputs], [angles], [ca.vertcat(equations.angles, 0)])
+    return rates, outputs
 
 
 def deviation_column(vehicle: Vehicle, name: str, numbers: Numbers, motion: Motion, equations: Undeviated) -> ca.SX:

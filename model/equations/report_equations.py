@@ -87,7 +87,7 @@ class _Equations:
         tables = {name: self.tables[name] for group in self.numbers.groups for name in group.names}
         parameters = self.numbers.parameters
         values = {p.name: parameters.vector[i] for i, p in enumerate(parameters.parameters)}
-        return tables | {symbol.name(): symbol for symbol in motion.elements()} | values
+        return tables | {symbol.name(): symbol for symbol in ca.symvar(motion)} | values
 
     def rigid_body(self) -> list[Equation]:
         tables, area, m = self.tables, self.numbers.area, self.motion

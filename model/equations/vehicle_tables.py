@@ -31,7 +31,7 @@ def vehicle_tables(vehicle: Vehicle) -> tuple[TableGroup, ...]:
     wind_group = TableGroup.from_polynomials("wind", "altitude", over_altitude, bottom, top)
     knots = mean_knots(vehicle.start, vehicle.end, vehicle.discontinuities)
     zero = np.zeros((knots.size - 1, 4, len(MEAN_TABLES)))
-    mean_group = TableGroup("mean", "time", tuple(MEAN_TABLES), ("rad",) * len(MEAN_TABLES), knots, zero)
+    mean_group = TableGroup("mean", "time", tuple(MEAN_TABLES), ("rad",) * len(MEAN_TABLES), knots, zero, "mean")
     return flight, wind_group, mean_group
 
 

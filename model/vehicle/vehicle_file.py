@@ -12,6 +12,7 @@ from ..files.folder_files import FileName
 from ..files.toml_file import Name, NotNegative, Positive, Section, read_toml
 
 ExtraOutput = Literal["lateral_drift", "drift_rate", "dynamic_pressure_times_angle_of_attack", "load_components"]
+STRUCTURE = "structure"  # marks keys that change the equations, not numbers in them
 NoiseLoads = Literal["moved_line", "couple_forward", "couple_aft", "as_reported"]
 
 
@@ -28,8 +29,8 @@ class TableEntry(Section):
 class TransferFunctionEntry(Section):
     """Numerator and denominator in descending powers of s, as the report prints them."""
 
-    numerator: tuple[float, ...]
-    denominator: tuple[float, ...]
+    numerator: Annotated[tuple[float, ...], STRUCTURE]
+    denominator: Annotated[tuple[float, ...], STRUCTURE]
     source: str = ""
 
     @model_validator(mode="after")
@@ -87,7 +88,7 @@ class BendingEntry(Section):
 
 
 class SloshEntry(Section):
-    name: Name
+    name: Annotated[Name, STRUCTURE]
     damping: NotNegative
     table: TableEntry
 
@@ -95,7 +96,7 @@ class SloshEntry(Section):
 class LoadEntry(Section):
     """A bending moment. ``forward_of_gimbal_m`` is ``station_m`` from the gimbal plane; slosh_reaction needs it."""
 
-    output: Name
+    output: Annotated[Name, STRUCTURE]
     station_m: float
     forward_of_gimbal_m: float | None = None
     table: TableEntry
@@ -105,10 +106,10 @@ class LoadEntry(Section):
 class NoiseEntry(Section):
     """A relative deviation of the named tables, coloured unless ``white`` is set."""
 
-    tables: tuple[str, ...]
+    tables: Annotated[tuple[str, ...], STRUCTURE]
     sigma: NotNegative
     correlation_time_s: Positive = 1.0
-    white: bool = False
+    white: Annotated[bool, STRUCTURE] = False
     source: str = ""
 
 
@@ -160,7 +161,7 @@ class WindRecordEntry(Section):
 class WindEntry(Section):
     """``synthesis`` chooses between ``filter``, a file of 'ascentwind wind fit', and [wind.correlation]."""
 
-    synthesis: Literal["fitted", "closed_form"] | None = None
+    synthesis: Annotated[Literal["fitted", "closed_form"] | None, STRUCTURE] = None
     statistics: TableEntry
     standard_deviation: Literal["table", "cr103010_fit"] = "table"
     filter: FileName | None = None
@@ -221,15 +222,15 @@ class VehicleFile(Section):
     weighting_times_s: tuple[float, ...] = ()
     reference_area_m2: Positive
     reference_area_source: str = ""
-    events: dict[str, float] = Field(default_factory=dict)
+    events: Annotated[dict[str, float], STRUCTURE] = Field(default_factory=dict)
     tables: TablesEntry
     control: ControlEntry
-    bending: tuple[BendingEntry, ...] = ()
-    slosh: tuple[SloshEntry, ...] = ()
-    loads: tuple[LoadEntry, ...] = ()
-    noise: dict[Name, NoiseEntry] = Field(default_factory=dict)
+    bending: Annotated[tuple[BendingEntry, ...], STRUCTURE] = ()
+    slosh: Annotated[tuple[SloshEntry, ...], STRUCTURE] = ()
+    loads: Annotated[tuple[LoadEntry, ...], STRUCTURE] = ()
+    noise: Annotated[dict[Name, NoiseEntry], STRUCTURE] = Field(default_factory=dict)
     wind: WindEntry
-    options: OptionsEntry = OptionsEntry()
+    options: Annotated[OptionsEntry, STRUCTURE] = OptionsEntry()
 
 
 def read_vehicle_file(file: Path, changes: Mapping[str, Any] | None = None) -> VehicleFile:

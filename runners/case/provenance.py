@@ -43,7 +43,7 @@ def data_hash(case: Case) -> str:
     """Return a hash of parameters and tables, the mean response excepted, which follows from the others."""
     digest = hashlib.sha256()
     for group in case.executable.groups:
-        if group.name != "mean":
+        if group.kind == "given":
             digest.update(group.run_time_vector().tobytes())
     digest.update(case.executable.parameters.tobytes())
     return digest.hexdigest()[:32]

@@ -11,12 +11,11 @@ from numpy.typing import NDArray
 from ...codegen.system.executable import ExecutableSystem
 from ...model.errors import DataError, ParameterValueError, suggestion
 from ...model.tables import TableGroup
-from ..sensitivity.request import STRUCTURAL
+from ..sensitivity.request import is_structure
 from ..study import Study
 from .plan import ParameterStudyPlan, PlannedQuantity
 
 TABLES = "tables."
-MEAN_GROUP = "mean"  # tables that follow from the others
 # last word of the names of tables that a vehicle's files may not hold negative, the first also not zero
 POSITIVE = ("mass", "moment_of_inertia", "relative_velocity", "frequency", "generalized_mass")
 NOT_NEGATIVE = ("dynamic_pressure", "thrust", "control_thrust")
@@ -47,7 +46,7 @@ class Quantity:
 
 def table_names(groups: Sequence[TableGroup]) -> list[str]:
     """Return the tables that a factor may multiply, as 'tables.NAME'."""
-    return [TABLES + name for group in groups if group.name != MEAN_GROUP for name in group.names]
+    return [TABLES + name for group in groups if group.kind == "given" for name in group.names]
 
 
 def resolve_quantities(study: Study, plan: ParameterStudyPlan) -> tuple[Quantity, ...]:
@@ -83,7 +82,7 @@ def _check_target(study: Study, name: str, where: str) -> None:
         return
     if TABLES + name in tables:
         raise DataError(f"'{name}' is a table; write '{TABLES}{name}' for a factor on the whole of it", column=where)
-    if name in study.system.structure or (STRUCTURAL.search(name) and not name.startswith(TABLES)):
+    if is_structure(study, name):
         raise DataError(
             f"'{name}' is structure, not a number: another value makes other equations; edit the vehicle file and "
             "make a study of each vehicle",

@@ -40,7 +40,7 @@ def sensitivities(
     check_end_time(case, ends[0])
     names = case.checked_responses(responses)
     requests = [Request.of(case, name, source, quantity) for name in names]
-    rows = parameter_rows(case.system, parameters)
+    rows = parameter_rows(case, parameters)
     warn_if_unstable(case.executable, ends[-1])
     functions = node_functions_of(case.executable)
     flight = FlightNodes.until(case.with_means, functions, ends, keep=len(ends) * len(requests) > 1)

@@ -40,7 +40,7 @@ def sensitivity(
 ) -> xr.Dataset:
     """See :meth:`Study.sensitivity`."""
     request = Request.of(case, response, source, quantity)
-    rows = parameter_rows(case.system, parameters)
+    rows = parameter_rows(case, parameters)
     at_peak = isinstance(time, str)
     time, at_limit = end_time(case, request, time)
     warn_if_unstable(case.executable, time)
@@ -56,7 +56,7 @@ def sensitivity(
         )
     relative_to = value if elasticity else None
     variables, coordinates = _parameter_sensitivities(case, gradient, rows, relative_to)
-    if any(g.name != "mean" for g in case.system.tables):
+    if any(g.kind == "given" for g in case.system.tables):
         total = total_density(case.with_means.groups, pair, gradient)
         start = start_share(case.vehicle, pair, factors[0]) if factors[0] else None
         for more in (table_sensitivities, knot_sensitivities):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -10,18 +9,14 @@ import numpy as np
 
 from ...codegen.nodes.compiled import node_functions_of
 from ...model.errors import AscentwindError, UnknownNameError
-from ...model.system.linear_system import COMBINED, LinearSystem
+from ...model.system.linear_system import COMBINED
+from ...model.vehicle.structural_keys import structural_keys
 from ..case.case import Case
 from ..solvers.flight_nodes import FlightNodes
 from ..statistics.larger_side import LARGER_SIDE, larger_side, sign
 from .pair import AdjointPair
 
 QUANTITIES: tuple[str, ...] = (LARGER_SIDE, "std", "variance", "mean", "mean_plus_3sigma")
-
-
-STRUCTURAL = re.compile(
-    r"^(options|events)\.|(count|number|order|synthesis|modes?|tanks?|masses|sources?|states?|loads?|outputs?)$"
-)
 
 
 class ZeroQuantityError(AscentwindError):
@@ -139,20 +134,26 @@ class Request:
         return abs(mean) if self.quantity == "mean" else self.value(variance, mean)
 
 
-def parameter_rows(system: LinearSystem, wanted: Iterable[str] | None) -> list[int]:
+def is_structure(case: Case, name: str) -> bool:
+    """Return whether a name is a part of a system's structure, or a key of its vehicle's file that changes it."""
+    of_vehicle = structural_keys(case.vehicle.file) if case.vehicle is not None else ()
+    return name in case.system.structure or name in of_vehicle
+
+
+def parameter_rows(case: Case, wanted: Iterable[str] | None) -> list[int]:
     """Return the numbers of parameters by name, all without names.
 
     Raises
     ------
     UnknownNameError, StructuralParameterError
     """
-    names = system.parameter_names
+    system, names = case.system, case.system.parameter_names
     if wanted is None:
         return list(range(len(names)))
     rows = []
     for name in dict.fromkeys([wanted] if isinstance(wanted, str) else wanted):
         if name not in names:
-            if name in system.structure or STRUCTURAL.search(name):
+            if is_structure(case, name):
                 raise StructuralParameterError(name)
             if any(name in group.names for group in system.tables):
                 raise TableParameterError(name)

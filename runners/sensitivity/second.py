@@ -49,7 +49,7 @@ def second_derivatives(
 ) -> xr.Dataset:
     """See :meth:`Study.second_derivatives`."""
     request = Request.of(case, response, source, quantity)
-    rows = parameter_rows(case.system, parameters)
+    rows = parameter_rows(case, parameters)
     if not 1 <= len(rows) <= MOST:
         raise ParameterValueError(f"{len(rows)} parameters were asked for; second derivatives are for 1 to {MOST}")
     at, _ = end_time(case, request, time)

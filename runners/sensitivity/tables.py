@@ -60,7 +60,7 @@ def table_sensitivities(
     groups = case.with_means.groups
     names = [n for g in groups for n in g.names]
     units = [u for g in groups for u in g.units]
-    columns = [names.index(n) for g in groups if g.name != "mean" for n in g.names]
+    columns = [names.index(n) for g in groups if g.kind == "given" for n in g.names]
     values, values_at_end, weights = pair.tables, pair.tables_at_end, pair.weights
     per_second = {RULE: "quantity table^-1 s^-1", "long_name": "derivative with respect to the table's value at a time"}
     variables: dict[str, tuple] = {

@@ -91,9 +91,7 @@ def with_mean_tables(
     ``respond`` computes the mean at given times: CVODES, or the sweep's own.
     """
     system = executable.system
-    at = next(
-        (i for i, g in enumerate(executable.groups) if g.name == "mean" and set(g.names) == set(MEAN_TABLES)), None
-    )
+    at = next((i for i, g in enumerate(executable.groups) if g.kind == "mean"), None)
     if at is None:
         return executable
     group = executable.groups[at]

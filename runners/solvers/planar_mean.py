@@ -156,7 +156,7 @@ def with_nonlinear_mean(vehicle: Vehicle, filled: ExecutableSystem) -> Executabl
     DataError, IntegrationError
         As :func:`planar_mean`.
     """
-    at = next(i for i, group in enumerate(filled.groups) if group.name == "mean")
+    at = next(i for i, group in enumerate(filled.groups) if group.kind == "mean")
     group, found = filled.groups[at], planar_mean(vehicle, filled)
     columns = [RESPONSES.index(MEAN_TABLES[name][1]) for name in group.names]
     correction = mean_splines(group, (found.nonlinear - found.linear)[:, columns], filled.system.discontinuities)

@@ -43,7 +43,7 @@ def mean_comparison(study: Case) -> xr.Dataset:
     if study.vehicle is None:
         raise UnknownNameError("mean flight of a system of one's own", study.system.name, [])
     planar = planar_mean(study.vehicle, study.executable)
-    group = next(g for g in study.linear_means.groups if g.name == "mean")
+    group = next(g for g in study.linear_means.groups if g.kind == "mean")
     columns = [group.names.index(f"mean.{name}") for name in RESPONSES]
     whole = group.evaluate(planar.times)[:, columns]
     return xr.Dataset(

@@ -106,7 +106,7 @@ def test_linear_mean_is_that_of_the_assembled_model_without_bending_and_slosh():
     rigid = Study.load("as504", compile=False, changes={"bending": [], "slosh": [], "loads": []})
     assert rigid.vehicle is not None
     found = planar_mean(rigid.vehicle, rigid.executable)
-    group = next(g for g in rigid.with_means.groups if g.name == "mean")
+    group = next(g for g in rigid.with_means.groups if g.kind == "mean")
     for i, name in enumerate(RESPONSES):
         expected = group.evaluate(found.times)[:, group.names.index(f"mean.{name}")]
         size = np.abs(expected).max()

@@ -23,7 +23,7 @@ def grid(*quantities: dict, **more) -> dict:
 
 CASES = {
     "unknown parameter": (dispersion(9, normal("gian", 0.1)), r"no parameter or table 'gian'; did you mean 'gain'\?"),
-    "structure": (dispersion(9, normal("filter_order", 1.0)), r"'filter_order' is structure, not a number"),
+    "structure": (dispersion(9, normal("states", 1.0)), r"'states' is structure, not a number"),
     "zero sigma": (dispersion(9, normal("gain", 0.0)), r"quantity.0.sigma.*greater than 0 \(found 0.0\)"),
     "negative sigma": (dispersion(9, normal("gain", -1.0)), r"quantity.0.sigma.*greater than 0 \(found -1.0\)"),
     "no sigma": (dispersion(9, {"name": "gain", "distribution": "normal"}), r"needs a sigma above zero"),
@@ -56,7 +56,7 @@ CASES = {
     "times that are none": (dispersion(9, GAIN) | {"times": "1:2"}, r"'times': '1:2' does not name times; write START"),
     "tolerance": (dispersion(9, GAIN) | {"relative_tolerance": 0.9}, r"'relative_tolerance'.*less than or equal to"),
     "text for a list": (grid({"name": "gain", "values": "1.0"}), r"values.*should be a valid list \(found '1.0'\)"),
-    "an option": (grid({"name": "options.full_coupling", "values": [1.0]}), r"is structure, not a number"),
+    "an option of no vehicle": (grid({"name": "options.full_coupling", "values": [1.0]}), r"there is no parameter or"),
     "more members than memory": (dispersion(10**11, GAIN), r"members.*less than or equal to 10000000"),
     "more values than memory": (grid({"name": "gain", "linspace": [0, 1, 10**10]}), r"linspace.*less than or equal to"),
     "more combinations than memory": (
@@ -100,6 +100,9 @@ def test_a_table_without_its_prefix_and_errors_of_a_file(as504, tmp_path):
     file = tmp_path / "mass.toml"
     file.write_text('format = 1\ntitle = "t"\nvehicle = "as504"\n[[grid.quantity]]\nname = "mass"\nvalues = [0.9]\n')
     with pytest.raises(DataError, match=r"mass.toml, column 'grid.quantity.0': 'mass' is a table; write 'tables.mass'"):
+        run_parameter_study(file, tmp_path / "out", study=as504)
+    file.write_text(file.read_text().replace('"mass"', '"options.full_coupling"'))
+    with pytest.raises(DataError, match=r"'options.full_coupling' is structure, not a number"):
         run_parameter_study(file, tmp_path / "out", study=as504)
     file.write_text('format = 1\ntitle = "t"\n[[grid.quantity]]\nname = "mass"\nvalues = [0.9]\n')
     with pytest.raises(DataError, match=r"mass.toml, column 'vehicle': is missing; name a shipped vehicle"):
