@@ -81,6 +81,7 @@ def test_sensed_angle_of_attack_is_the_direction_of_the_air_past_a_moving_and_tu
 
 @pytest.mark.parametrize("coupling", [False, True])
 @pytest.mark.parametrize("time", [47.0, 75.0, 110.0])
+@pytest.mark.slow
 def test_assembled_filters_take_what_the_sensors_measure(relief_folder, relief, coupling, time):
     study = Study.load(relief_folder, compile=False, changes={"options.full_coupling": True}) if coupling else relief
     study = study.with_parameters(GAINS)

@@ -211,6 +211,7 @@ MOVED_LINE, MOVED_MODE, SECOND = "center_of_pressure", "normal_force_slope_times
         (((LOAD, MOVED_LINE), (LOAD, SECOND)), "as_reported"),
     ],
 )
+@pytest.mark.slow
 def test_vehicles_without_the_columns_load_with_a_hint(vehicle_folder, edit, columns, form):
     edit('noise_loads = "moved_line"', "# none:")
     for table, column in columns:

@@ -64,6 +64,7 @@ PLANTED = "__attribute__((constructor)) static void planted(void) { *(volatile i
     ],
 )
 @pytest.mark.skipif(find_compiler() is None, reason="compiles")
+@pytest.mark.slow
 def test_text_of_a_user_stays_in_its_comment(text, tmp_path, monkeypatch):
     """Names, units and the system's name hold C; the libraries compile, load, and answer as the plain system does."""
     cache = tmp_path / "inside" / "cache"
