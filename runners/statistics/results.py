@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
+from ...model.deprecation import warn_deprecated
 from ...model.errors import ParameterValueError, UnknownNameError
 from ...model.system.linear_system import COMBINED
 from ..present.files import prepare_folder
@@ -97,8 +97,7 @@ class ResponseStatistics:
             raise AttributeError(f"'{type(self).__name__}' has no attribute '{name}'", name=name, obj=self)
         if name in self.dataset.variables:
             return self.dataset[name]
-        text = f"statistics.{name} is statistics.dataset.{name} now, and will go with the next release"
-        warnings.warn(text, DeprecationWarning, stacklevel=2)
+        warn_deprecated(f"statistics.{name}", f"statistics.dataset.{name}")
         return getattr(self.dataset, name)
 
     def sel(self, **labels: Any) -> ResponseStatistics:

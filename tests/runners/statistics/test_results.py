@@ -8,7 +8,13 @@ import pytest
 import xarray as xr
 from lag import lag, plan
 
-from ascentwind.model.errors import AscentwindError, DataError, ParameterValueError, UnknownNameError
+from ascentwind.model.errors import (
+    AscentwindError,
+    DataError,
+    DeprecatedNameWarning,
+    ParameterValueError,
+    UnknownNameError,
+)
 from ascentwind.runners.sensitivity.layout import stored_layout
 from ascentwind.runners.statistics.peak_check import check_peaks, with_peak_check
 from ascentwind.runners.statistics.results import ResponseStatistics
@@ -190,7 +196,7 @@ def test_files_that_are_none(tmp_path, spoil):
 
 
 def test_what_a_dataset_had_still_works_and_says_where_it_went(statistics):
-    with pytest.warns(DeprecationWarning, match=r"statistics\.dataset\.isel"):
+    with pytest.warns(DeprecatedNameWarning, match=r"statistics\.dataset\.isel"):
         first = statistics.isel(time=0)
     assert first["time"] == 40.0
     with warnings.catch_warnings():
