@@ -47,7 +47,7 @@ def own(thing: Any) -> bool:
 
 def offered() -> Iterator[tuple[str, Any]]:
     """Yield every public function, class and method behind the front door, methods of base classes of ours too."""
-    for name in sorted(aw.__all__):
+    for name in sorted(dir(aw)):
         thing = getattr(aw, name)
         if not callable(thing):
             continue
@@ -88,7 +88,7 @@ def faults(thing: Any) -> list[str]:
         said.append(f"it does not say what it returns ({result})")
     if len(parameters) > 1 and "Raises" not in found:
         said.append("it does not say what it raises")
-    known = vars(builtins).keys() | set(aw.errors.__all__)
+    known = vars(builtins).keys() | set(dir(aw.errors))
     for kind in ("Raises", "Warns"):
         said += [f"{n} is no error of ascentwind.errors" for n in entries(found.get(kind, "")) if n not in known]
     return said

@@ -61,7 +61,7 @@ def build_vehicle(
         )
     folder = Path(vehicle) if Path(vehicle).is_dir() or vehicle not in shipped else shipped[vehicle]
     with steps(STEPS[0], len(STEPS) + len(FIGURES) + 1) as bar:
-        following = dict(zip(STEPS, (*STEPS[1:], "tables"), strict=True))
+        following: dict[str, str] = dict(zip(STEPS, (*STEPS[1:], "tables"), strict=True))
         numbers, written = build(folder, out, spacing=spacing, progress=lambda step: bar.done(following[step]))
         bar.done("figures")
         job = Job(figures or (out or folder) / "figures")

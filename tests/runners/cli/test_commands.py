@@ -7,7 +7,9 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import pytest
 import typer
@@ -64,6 +66,11 @@ def changes_asked_for(monkeypatch, tmp_path):
     return run
 
 
+def all_commands() -> Mapping[str, Any]:
+    group: Any = typer.main.get_command(app)
+    return group.commands
+
+
 @pytest.mark.parametrize("arguments", TAKE_CHANGES, ids=" ".join)
 def test_changes_reach_the_vehicle(changes_asked_for, arguments):
     assert not changes_asked_for(arguments)
@@ -75,7 +82,7 @@ def test_every_command_with_changes_is_tried():
     def takes(command) -> bool:
         return any("--set" in parameter.opts for parameter in command.params)
 
-    commands = typer.main.get_command(app).commands
+    commands = all_commands()
     found = {name for name, command in commands.items() if takes(command)}
     found |= {f"wind {name}" for name, command in commands["wind"].commands.items() if takes(command)}
     assert found == {" ".join(words[: 2 if words[0] == "wind" else 1]) for words in TAKE_CHANGES}
@@ -109,7 +116,7 @@ def test_a_file_is_imported_for_its_own_command_alone():
 def test_every_command_stands_in_its_file(name):
     module = importlib.import_module(f"ascentwind.runners.cli.{FILES[name]}")
     assert hasattr(module, name.replace("-", "_"))
-    command = typer.main.get_command(app).commands[name]
+    command = all_commands()[name]
     assert command.name == name
     assert command.help
 
