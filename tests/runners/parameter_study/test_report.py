@@ -245,11 +245,11 @@ def test_tornado_bars_are_the_changes(swept):
     names = [text.get_text() for text in axes.get_yticklabels()]
     assert names == ["gain\n2 … 4.5", "tau\n-5 … 2.2", "level\n1.4 … 1.6"]  # the largest on top
     low, high = ([bar.get_width() for bar in container] for container in axes.containers)
-    level = mean * 0.1 / INPUT
+    level = float(mean * 0.1 / INPUT)
     mean, std = closed_form(3.0, 2.2)
-    tau = mean + 3 * std - peak
-    np.testing.assert_allclose(low, [peak * (2.0 / GAIN - 1), 0.0, -level], rtol=1e-5, atol=1e-9)
-    np.testing.assert_allclose(high, [peak * (4.5 / GAIN - 1), tau, level], rtol=1e-5)
+    tau = float(mean + 3 * std - peak)
+    np.testing.assert_allclose(low, [float(peak * (2.0 / GAIN - 1)), 0.0, -level], rtol=1e-5, atol=1e-9)
+    np.testing.assert_allclose(high, [float(peak * (4.5 / GAIN - 1)), tau, level], rtol=1e-5)
     assert [t.get_text() for t in axes.texts] == ["", "unstable at the low value", ""]
     marks = line(figure, "first order")[0]
     np.testing.assert_allclose(marks[[0, 3]], [peak * (2.0 / GAIN - 1), peak * (4.5 / GAIN - 1)], rtol=1e-5)
