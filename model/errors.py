@@ -187,6 +187,14 @@ class UnknownNameError(AscentwindError):
         super().__init__(f"there is no {kind} '{name}'{suggestion(name, self.known)}")
 
 
+class NoVehicleError(UnknownNameError):
+    """Something was asked of a system of one's own that only a vehicle has."""
+
+    def __init__(self, what: str, system: str):
+        self.kind, self.name, self.known = "vehicle", system, ()
+        Exception.__init__(self, f"{what} asks for a vehicle, and '{system}' is a system of one's own: use Study.load")
+
+
 class ParameterValueError(AscentwindError, ValueError):
     """A parameter was given a value that the equations cannot use."""
 

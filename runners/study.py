@@ -19,7 +19,6 @@ from .sensitivity.many import sensitivities
 from .sensitivity.one import sensitivity
 from .sensitivity.second import second_derivatives
 from .solvers.adjoint import AdjointSolver
-from .solvers.mean_response import with_mean_tables
 from .solvers.sweep import batch, sweep
 from .statistics.cvodes import Cvodes
 from .statistics.dataset import batch_dataset, with_members
@@ -148,7 +147,6 @@ class Study(Case):
         """
         if not parameter_sets:
             raise ParameterValueError("a batch needs at least one set of parameter values")
-        self.require_linear_mean("a batch")
         ends = self.checked_times(end_times(times))
         self.checked_responses(None)
         values = [self.numbers(changes) for changes in parameter_sets]
@@ -164,7 +162,7 @@ class Study(Case):
                 raise IntegrationError("CVODES computes one set after another; leave 'threads' out, or take the sweep")
             members = []
             for numbers in values:
-                member = with_mean_tables(self.executable.with_numbers(parameters=numbers))
+                member = self.mean.fill(self.executable.with_numbers(parameters=numbers))
                 solver = AdjointSolver(member, chosen)
                 runs = [solver.run(time) for time in ends]
                 members.append((np.array([run.mean for run in runs]), np.array([run.variance for run in runs])))
@@ -176,6 +174,7 @@ class Study(Case):
                 ends,
                 relative_tolerance=chosen.relative_tolerance,
                 threads=threads,
+                fill=self.mean.fill,
             )
             members = [(member.mean, member.variance) for member in found]
         else:

@@ -26,6 +26,7 @@ STUBS = {
 }
 HEAVY = ("casadi", "matplotlib", "numpy", "pandas", "scipy", "xarray")
 EXAMPLES = {
+    "NoVehicleError": lambda: errors.NoVehicleError("another wind", "lag"),
     "BatchError": lambda: errors.BatchError({1: errors.IntegrationError("too fast")}, {0: sweep_result()}),
     "CompilerError": lambda: errors.CompilerError(["cc", "-O3"], 1, "no such file"),
     "DataError": lambda: errors.DataError("is odd", file=Path("vehicle.toml"), column="mass", row=3, time=1.5),

@@ -61,6 +61,11 @@ class Vehicle:
     sources: tuple[TableSource, ...]
 
     @property
+    def start_altitude(self) -> float:
+        """Altitude where the flight starts, m."""
+        return float(self.tables["altitude"].polynomial(self.start))
+
+    @property
     def bending(self) -> tuple[BendingEntry, ...]:
         return self.file.bending
 

@@ -13,7 +13,14 @@ from numpy.typing import NDArray
 
 from ...codegen.system.executable import ExecutableSystem, executable_system
 from ...model.equations.assemble import assemble
-from ...model.errors import DataError, NotPicklableError, ParameterValueError, TimeRangeError, UnknownNameError
+from ...model.errors import (
+    DataError,
+    NotPicklableError,
+    NoVehicleError,
+    ParameterValueError,
+    TimeRangeError,
+    UnknownNameError,
+)
 from ...model.system.labels import Parameter
 from ...model.system.linear_system import LinearSystem
 from ...model.tables import table_values
@@ -23,11 +30,11 @@ from ...model.vehicle.shipped import find_vehicle
 from ...model.vehicle.vehicle import Vehicle
 from ...model.wind.statistics import WindModel
 from ..present.notebook import html_page
-from ..solvers.mean_response import with_mean_tables
-from ..solvers.planar_mean import with_nonlinear_mean
+from ..solvers.mean_response import Respond, mean_response
 from ..solvers.stability import Root, check_coupling, matrices_at, roots
-from ..solvers.sweep import available_sweep, with_sweep_mean_tables
+from ..solvers.sweep import available_sweep, forward_mean
 from ..solvers.time_nodes import on_flight
+from .mean import LinearMean, NonlinearMean
 from .summary import summary
 from .wind_start import covariance_at
 
@@ -105,8 +112,7 @@ class Case:
         ------
         SingularCouplingError, CompilerError
         """
-        altitude = float(vehicle.tables["altitude"].polynomial(vehicle.start))
-        system = assemble(vehicle, covariance_at(vehicle.wind.shaping_filter, altitude))
+        system = assemble(vehicle, covariance_at(vehicle.wind.shaping_filter, vehicle.start_altitude))
         executable = executable_system(system, compile)
         check_coupling(executable)
         return cls(executable, vehicle)
@@ -193,6 +199,32 @@ class Case:
             values[names.index(name)] = number
         return values
 
+    def vehicle_for(self, what: str) -> Vehicle:
+        """Return the vehicle for a question that only a vehicle answers.
+
+        Parameters
+        ----------
+        what : str
+            The question, which begins the sentence of the error.
+
+        Returns
+        -------
+        Vehicle
+
+        Raises
+        ------
+        NoVehicleError
+            The case is a system of one's own.
+        """
+        if self.vehicle is None:
+            raise NoVehicleError(what, self.system.name)
+        return self.vehicle
+
+    @property
+    def start_altitude(self) -> float:
+        """Altitude where the flight starts, m; of a vehicle only, else a NoVehicleError."""
+        return self.vehicle_for("the altitude of the start").start_altitude
+
     def with_wind(self, wind: WindModel) -> Self:
         """Return a study of the same vehicle in another wind.
 
@@ -207,8 +239,7 @@ class Case:
 
         Raises
         ------
-        UnknownNameError
-            If the study has no vehicle.
+        NoVehicleError
         DataError
             A filter without its mean; a wind that the flight does not meet, or whose parts are of different winds.
 
@@ -219,30 +250,38 @@ class Case:
         WindWarning
             The filter's standard deviation is more than a tenth from the table's.
         """
-        if self.vehicle is None:
-            raise UnknownNameError("wind of a system of one's own", self.system.name, [])
+        vehicle = self.vehicle_for("another wind")
         if not isinstance(wind, WindModel):
             raise DataError(
                 f"a wind is a mean and a filter of the same statistics, and {type(wind).__name__} is not: give "
                 "WindModel(statistics.mean_table(), filter)"
             )
-        check_wind(wind, loaded_flight(self.vehicle.tables, self.vehicle.start, self.vehicle.end))
-        case = self.from_vehicle(replace(self.vehicle, wind=wind), compile=self.executable.shared_library is not None)
+        check_wind(wind, loaded_flight(vehicle.tables, vehicle.start, vehicle.end))
+        case = self.from_vehicle(replace(vehicle, wind=wind), compile=self.executable.shared_library is not None)
         values = {n: p.value for n, p in self.parameters.items() if n in case.parameters}
         return case.with_parameters(values)
 
     @cached_property
+    def mean(self) -> LinearMean | NonlinearMean:
+        """How tables of the mean response are filled, as the vehicle's options ask."""
+        if self.vehicle is not None and self.vehicle.file.options.mean_response == "nonlinear":
+            return NonlinearMean(self.vehicle)
+        return LinearMean()
+
+    @cached_property
     def linear_means(self) -> ExecutableSystem:
         """The system with its tables of the mean response filled in by the linear mean."""
-        engine = available_sweep(self.executable)
-        return with_mean_tables(self.executable) if engine is None else with_sweep_mean_tables(engine, self.executable)
+        return LinearMean().fill(self.executable, self._respond)
 
     @cached_property
     def with_means(self) -> ExecutableSystem:
         """The system with the tables of the mean response that the noise coefficients need, as the options ask."""
-        if self.vehicle is not None and self.vehicle.file.options.mean_response == "nonlinear":
-            return with_nonlinear_mean(self.vehicle, self.linear_means)
-        return self.linear_means
+        return self.mean.fill(self.executable, self._respond)
+
+    @property
+    def _respond(self) -> Respond:
+        engine = available_sweep(self.executable)
+        return mean_response if engine is None else forward_mean(engine)
 
     def matrices(self, time: float) -> tuple[NDArray, NDArray, NDArray, NDArray]:
         """Return the matrices at a time; names of their rows and columns are in ``system``.
@@ -314,7 +353,7 @@ class Case:
         ------
         ParameterValueError
         """
-        if self.vehicle is not None and self.vehicle.file.options.mean_response == "nonlinear":
+        if isinstance(self.mean, NonlinearMean):
             raise ParameterValueError(f'{what} follows the linear mean response; set options.mean_response = "linear"')
 
     def check_spacing(self, spacing: float) -> None:

@@ -36,8 +36,8 @@ def verify(
     ensemble = Ensemble(runs=runs, seed=seed, paths=min(30, runs) if out else 0)
     study = load_study(vehicle, changes, [] if times else ["default_times"])
     job = Job(out) if out else None
-    assert study.vehicle is not None
-    end_times = parse_times(times) if times else spread_over(parse_times(study.vehicle.file.default_times), 4)
+    flown = study.vehicle_for("default times")
+    end_times = parse_times(times) if times else spread_over(parse_times(flown.file.default_times), 4)
     with console.status("computing with every engine"):
         found = run_verification(study, end_times, ensemble)
     _print_verification(found)
@@ -100,8 +100,8 @@ def tolerance(
 
     end_times = parse_times(times) if times else []
     study = load_study(vehicle, changes)
-    assert study.vehicle is not None
-    end_times = end_times or [time_of_greatest_dynamic_pressure(study.vehicle)]
+    flown = study.vehicle_for("default times")
+    end_times = end_times or [time_of_greatest_dynamic_pressure(flown)]
     named = times or f"{end_times[0]:g}"
     job = Job(out or results_folder(vehicle, "tolerance"))
     with steps("tolerances", len(TOLERANCES)) as bar:

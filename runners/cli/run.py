@@ -51,11 +51,11 @@ def run(
     if times and "default_times" in parse_changes(changes or []):
         raise UnusedOptionError("--set default_times is not used with --times; leave one of them out")
     study = load_study(vehicle, changes, SHOWN)
-    assert study.vehicle is not None
+    flown = study.vehicle_for("a run")
     chosen = engine_from(engine, compiled=study.executable.shared_library is not None, **settings)
-    end_times = parse_times(times or study.vehicle.file.default_times)
+    end_times = parse_times(times or flown.file.default_times)
     moment_time = None if along_vehicle is None else prepare_along_vehicle(study, along_vehicle)
-    families = [t for t in study.vehicle.file.weighting_times_s if study.system.start < t <= study.system.end]
+    families = [t for t in flown.file.weighting_times_s if study.system.start < t <= study.system.end]
     study.checked_times(end_times)
     job = Job(out or results_folder(vehicle, "results"))
     with steps("end times", len(end_times)) as bar:
@@ -72,7 +72,7 @@ def run(
         families = sorted({*families, *(p.time for p in check.peaks[:1] if p.time > study.system.start)})
     with steps("figures", len(study.system.outputs) + len(families) + 1) as bar:
         for output in study.system.outputs:
-            title = f"{study.vehicle.title}\n{words(output.name).capitalize()}, mean and {LABEL}"
+            title = f"{flown.title}\n{words(output.name).capitalize()}, mean and {LABEL}"
             job.written += write_figure(statistics.plot(output.name, title), job.folder, output.name)
             bar.done()
         weighting = []
@@ -81,7 +81,7 @@ def run(
             bar.done()
         if weighting:
             first = study.system.outputs[0]
-            title = f"{study.vehicle.title}\nWeighting function from wind to {words(first.name)}"
+            title = f"{flown.title}\nWeighting function from wind to {words(first.name)}"
             figure = weighting_figure(weighting, first.name, first.unit, title)
             job.written += write_figure(figure, job.folder, "weighting_functions")
         bar.done()
@@ -89,7 +89,7 @@ def run(
         with console.status("bending moment along the vehicle"):
             job.written += write_along_vehicle(study, end_times, moment_time, job.folder)
     _print_peaks(statistics)
-    top = study.vehicle.wind.mean.argument[-1]
+    top = flown.wind.mean.argument[-1]
     if study.tables(end_times[-1])["altitude"] > top:
         console.print(f"Above {top / 1000:g} km the wind tables end and their last values are held.", style="dim")
     job.end()

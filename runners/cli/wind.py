@@ -308,10 +308,10 @@ def compare(
     from ..wind.fitting.progress import fit_progress
 
     study = load_study(vehicle, changes)
-    assert study.vehicle is not None
-    record = recorded_wind(study.vehicle)
+    flown = study.vehicle_for("a comparison of winds")
+    record = recorded_wind(flown)
     component = record.origin.component
-    time = time_of_greatest_dynamic_pressure(study.vehicle) if time is None else time
+    time = time_of_greatest_dynamic_pressure(flown) if time is None else time
     limit = FitOptions().time_limit
     with fit_progress(console, "fitting filters", limit * len(CASES)) as fitting:
         winds = shipped_winds(component, record.sign, FitOptions(progress=fitting))

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from ...model.errors import UnknownNameError
 from ..solvers.adjoint import AdjointSolver
 from ..solvers.integration import CvodesSettings
-from ..solvers.mean_response import with_mean_tables
 from ..statistics.larger_side import larger_side, side
 from ..study import Study
 from .peaks import SIGNS
@@ -198,7 +197,7 @@ def verify_design(result: DesignResult, relative_tolerance: float = 1e-11) -> li
     peaks = search.point(_position(problem, result.values)).peaks
     study = result.study
     options = CvodesSettings(relative_tolerance=relative_tolerance)
-    solver = AdjointSolver(with_mean_tables(study.executable), options)
+    solver = AdjointSolver(study.mean.fill(study.executable), options)
     largest = peaks.max(axis=1)
     near = largest >= (1 - CLOSE) * largest.max(axis=1, keepdims=True)
     found = []

@@ -112,8 +112,7 @@ def load_design(file: Path, changes: Mapping[str, Any] | None = None) -> DesignT
                 if parameter not in entry.parameters:
                     raise UnknownNameError(f"parameter of trade variant '{name}'", parameter, entry.parameters)
             variants[name] = _problem(study, entry, {p: entry.parameters[p] for p in parameters})
-    assert study.vehicle is not None
-    return DesignTask(study.vehicle.title, problem, entry.trade, variants)
+    return DesignTask(study.vehicle_for("a design").title, problem, entry.trade, variants)
 
 
 def _problem(study: Study, entry: DesignEntry, parameters: dict[str, tuple[float, float]]) -> LoadReliefProblem:

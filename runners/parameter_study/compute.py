@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ...codegen.sweep.compiled import sweep_of
 from ...model.errors import AscentwindError
 from ..solvers.stability import first_unstable
-from ..solvers.sweep import sweep, with_sweep_mean_tables
+from ..solvers.sweep import sweep_member
 from ..study import Study
 from .quantities import Quantity, member_numbers
 
@@ -95,9 +95,13 @@ def compute_chunk(study: Study, task: Task, chunk: Chunk) -> ChunkResult:
     for k, row in enumerate(chunk.values):
         try:
             member = member_numbers(study, task.quantities, row)
-            member = with_sweep_mean_tables(engine, member, 1e-2 * task.relative_tolerance)
-            found = sweep(
-                engine, member, task.times, relative_tolerance=task.relative_tolerance, responses=task.responses
+            found = sweep_member(
+                engine,
+                member,
+                task.times,
+                relative_tolerance=task.relative_tolerance,
+                responses=task.responses,
+                fill=study.mean.fill,
             )
             reasons[k] = first_unstable(member, task.times[-1]) or ""
         except AscentwindError as error:

@@ -109,8 +109,8 @@ def inputs(correlation: tuple[float, float]) -> tuple[Input, ...]:
 
 def correlation_range(study: Study, statistics: WindStatistics) -> tuple[float, float]:
     """Return how much faster or slower the filter may run before a covariance leaves its 90 % interval."""
-    assert study.vehicle is not None
-    wind = study.vehicle.wind.shaping_filter
+    vehicle = study.vehicle_for("a calibration")
+    wind = vehicle.wind.shaping_filter
 
     def outside(logarithm: float) -> float:
         covariance = propagated_covariance(stretched(wind, float(np.exp(logarithm))), statistics.altitude, 250.0)
@@ -149,9 +149,9 @@ class Model:
         return self._in_wind(Study.load(out), values)
 
     def _in_wind(self, study: Study, values: dict[str, float]) -> Study:
-        assert study.vehicle is not None
+        vehicle = study.vehicle_for("a calibration")
         if values["wind_correlation"] != 1:
-            wind = study.vehicle.wind
+            wind = vehicle.wind
             faster = stretched(wind.shaping_filter, values["wind_correlation"])
             study = study.with_wind(replace(wind, shaping_filter=faster))
         numbers = {"bending_damping": "bending.", "slosh_damping": "slosh."}

@@ -116,8 +116,8 @@ def predict(study: Study, local: Responses, wind_sensitivity: float) -> list[Pre
     """
     found = responses(study.response_statistics(end_times(study)))
     modes = study.tables(TIME)
-    assert study.vehicle is not None
-    wind = verify(study.vehicle.wind.shaping_filter, shipped_statistics(top=16000.0))
+    vehicle = study.vehicle_for("a prediction")
+    wind = verify(vehicle.wind.shaping_filter, shipped_statistics(top=16000.0))
     ours = {
         "peak_mean": found.peak_mean,
         "peak_mean_local": local.peak_mean,

@@ -114,25 +114,24 @@ def check_sensitivity(
         reach = 0.5 * meeting.get(case.system.parameter_names.index(name), np.inf)
         differences.append(_difference(of_parameter, number, min(reach, STEP * (abs(number) or 1.0)), value))
     for k in _largest_rows(found, rows):
+        vehicle = case.vehicle_for("a table row")
         name, number = str(found["knot_table"].values[k]), float(found["knot_value"].values[k])
         row = int(np.sum(found["knot_table"].values[:k] == name))
 
-        def of_row(x: float, name: str = name, row: int = row) -> float:
-            assert case.vehicle is not None
-            return _value(of_vehicle(executable, _with_row(case.vehicle, name, row, x)), request, time)
+        def of_row(x: float, vehicle: Vehicle = vehicle, name: str = name, row: int = row) -> float:
+            return _value(of_vehicle(executable, _with_row(vehicle, name, row, x)), request, time)
 
         labels.append(f"{name} at {found['knot_argument'].values[k]:g}")
         at.append(number)
         derivatives.append(float(found["knot_derivative"].values[k]))
-        differences.append(_difference(of_row, number, STEP * _reach(case.vehicle, name, row), value))
+        differences.append(_difference(of_row, number, STEP * _reach(vehicle, name, row), value))
     return _agreement(labels, np.array(at), np.array(derivatives), differences, value, found.attrs)
 
 
 def of_vehicle(executable: ExecutableSystem, vehicle: Vehicle) -> ExecutableSystem:
     """Return the same code with the tables of a changed vehicle and its wind's covariance at the start."""
     system = executable.system
-    altitude = float(vehicle.tables["altitude"].polynomial(vehicle.start))
-    covariance = covariance_at(vehicle.wind.shaping_filter, altitude)
+    covariance = covariance_at(vehicle.wind.shaping_filter, vehicle.start_altitude)
     wind, rows = np.zeros((len(system.states),) * 2), system.block(WIND)
     wind[rows, rows] = covariance
     changed = replace(system, start_covariance={**system.start_covariance, WIND: wind})
@@ -159,9 +158,8 @@ def _largest_rows(found: xr.Dataset, count: int) -> list[int]:
     return list(chosen.values())
 
 
-def _reach(vehicle: Vehicle | None, name: str, row: int) -> float:
+def _reach(vehicle: Vehicle, name: str, row: int) -> float:
     """Return by how much a row may move: its own size, or for the altitude, which must increase, its rise."""
-    assert vehicle is not None
     values = vehicle_rows(vehicle)[name].values
     return abs(float(np.diff(values)[max(row - 1, 0)] if name == "altitude" else values[row]))
 

@@ -48,7 +48,7 @@ def start_share(vehicle: Vehicle | None, pair: AdjointPair, factor: float) -> St
     if vehicle is None or WIND not in pair.sources:
         return None
     shaping_filter = vehicle.wind.shaping_filter
-    bottom, top = float(shaping_filter.altitude[0]), float(vehicle.tables["altitude"].polynomial(vehicle.start))
+    bottom, top = float(shaping_filter.altitude[0]), vehicle.start_altitude
     if top <= bottom:
         return None
     a_top = pair.adjoint_at_start[pair.executable.system.block(WIND)]

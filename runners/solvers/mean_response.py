@@ -82,9 +82,13 @@ def mean_response(
     return MeanResponse(times, np.array(states), np.concatenate(outputs))
 
 
+Respond = Callable[[ExecutableSystem, NDArray[np.float64]], MeanResponse]
+FillMeans = Callable[[ExecutableSystem, Respond], ExecutableSystem]
+
+
 def with_mean_tables(
     executable: ExecutableSystem,
-    respond: Callable[[ExecutableSystem, NDArray[np.float64]], MeanResponse] = mean_response,
+    respond: Respond = mean_response,
 ) -> ExecutableSystem:
     """Return the system with its tables of the mean response filled in, if it has any.
 

@@ -21,7 +21,7 @@ from ...codegen.toolchain.library import InterpreterWarning
 from ...model.errors import AscentwindError, IntegrationError, TimeRangeError
 from ...model.system.linear_system import LinearSystem
 from .cores import available_cores
-from .mean_response import MeanResponse, with_mean_tables
+from .mean_response import FillMeans, MeanResponse, Respond, with_mean_tables
 from .step_budget import naming_fastest_root
 from .time_nodes import Interval, intervals, on_flight, time_nodes
 from .tolerances import check_relative_tolerance
@@ -186,10 +186,8 @@ def _at_start(
     return covariance, (matrices["G"] @ matrices["inputs"])[:, 0], 0.0
 
 
-def with_sweep_mean_tables(
-    engine: CompiledSweep, executable: ExecutableSystem, relative_tolerance: float = 1e-9
-) -> ExecutableSystem:
-    """Return the system with its tables of the mean response filled in by the sweep's own forward mean."""
+def forward_mean(engine: CompiledSweep, relative_tolerance: float = 1e-9) -> Respond:
+    """Return what computes the mean response at given times by the sweep's own forward mean."""
 
     def mean(of: ExecutableSystem, times: NDArray[np.float64]) -> MeanResponse:
         pieces = intervals(of, float(times[0]), float(times[-1]))
@@ -200,7 +198,36 @@ def with_sweep_mean_tables(
             states, outputs, _ = engine.mean_history(of, segments, relative_tolerance)
         return MeanResponse(times, states, outputs)
 
-    return with_mean_tables(executable, mean)
+    return mean
+
+
+def sweep_member(
+    engine: CompiledSweep,
+    numbers: ExecutableSystem,
+    times: ArrayLike,
+    *,
+    relative_tolerance: float,
+    responses: Sequence[str] | None = None,
+    fill: FillMeans = with_mean_tables,
+) -> SweepResult:
+    """Sweep one set of numbers, its tables of the mean response made for it at a hundredth of the tolerance.
+
+    Parameters
+    ----------
+    engine : CompiledSweep
+    numbers : ExecutableSystem
+        Parameters and tables of the member.
+    times, relative_tolerance, responses
+        As for :func:`sweep`.
+    fill : callable
+        Of a system and what computes its linear mean, that gives the system with its tables of the mean.
+
+    Raises
+    ------
+    TimeRangeError, DirectNoiseError, IntegrationError, DataError
+    """
+    member = fill(numbers, forward_mean(engine, 1e-2 * relative_tolerance))
+    return sweep(engine, member, times, relative_tolerance=relative_tolerance, responses=responses)
 
 
 def batch(
@@ -211,6 +238,7 @@ def batch(
     *,
     relative_tolerance: float = 1e-4,
     threads: int | None = None,
+    fill: FillMeans = with_mean_tables,
 ) -> list[SweepResult]:
     """Sweep many parameter sets, one after another on each of several threads.
 
@@ -224,6 +252,8 @@ def batch(
         As for ``sweep``; the mean tables are made at a hundredth of the tolerance.
     threads : int, optional
         All cores by default.
+    fill : callable
+        As for :func:`sweep_member`.
 
     Raises
     ------
@@ -240,8 +270,7 @@ def batch(
     def one(values: NDArray[np.float64]) -> SweepResult | AscentwindError:
         try:
             member = executable.with_numbers(parameters=np.asarray(values, float))
-            member = with_sweep_mean_tables(engine, member, 1e-2 * relative_tolerance)
-            return sweep(engine, member, times, relative_tolerance=relative_tolerance)
+            return sweep_member(engine, member, times, relative_tolerance=relative_tolerance, fill=fill)
         except AscentwindError as error:
             return error
 

@@ -19,7 +19,6 @@ from ..present.style import display, words
 from ..solvers.adjoint import AdjointHistory, AdjointSolver
 from ..solvers.covariance import covariance_equation
 from ..solvers.ensemble import std_interval
-from ..solvers.mean_response import with_mean_tables
 from .cvodes import Cvodes
 from .engine import relative_difference
 from .larger_side import larger_side, sign
@@ -119,7 +118,7 @@ def check_peaks(case: Case, statistics: ResponseStatistics) -> PeakCheck:
         reference, result = "covariance", covariance_equation(case.with_means, times, COVARIANCE_TOLERANCE)
         mean, variance = result.mean, result.variance.sum(axis=2)
     else:
-        reference, solver = "cvodes", AdjointSolver(_with_own_means(case), Cvodes())
+        reference, solver = "cvodes", AdjointSolver(case.mean.fill(case.executable), Cvodes())
         runs = []
         for time in times:
             run, histories[time] = solver.run_with_history(time, SPACING)
@@ -127,13 +126,6 @@ def check_peaks(case: Case, statistics: ResponseStatistics) -> PeakCheck:
         mean, variance = np.array([r.mean for r in runs]), np.array([r.variance.sum(axis=1) for r in runs])
     std = np.sqrt(np.maximum(variance[at, rows], 0.0))
     return PeakCheck(reference, found, mean[at, rows], std, _allowed(statistics, len(found)), histories)
-
-
-def _with_own_means(case: Case):
-    """Return the system with tables of the mean response by CVODES; of a nonlinear mean, which is by CVODES, those."""
-    if case.vehicle is not None and case.vehicle.file.options.mean_response == "nonlinear":
-        return case.with_means
-    return with_mean_tables(case.executable)
 
 
 def _allowed(statistics: ResponseStatistics, count: int) -> float:

@@ -64,7 +64,7 @@ def write_along_vehicle(study: Study, times: list[float], time: float | None, fo
     folder : Path
         Made and writable.
     """
-    assert study.vehicle is not None  # moments_along_vehicle needs one
+    vehicle = study.vehicle_for("the bending moment along the vehicle")
     found = moments_along_vehicle(study, sorted({*times, *([] if time is None else [time])}))
     if time is None:
         largest = _largest(found).max("station")
@@ -73,7 +73,7 @@ def write_along_vehicle(study: Study, times: list[float], time: float | None, fo
     return [
         write_netcdf(found, folder / f"{NAME}.nc"),
         write_whole(folder / f"{NAME}.csv", lambda p: p.write_text(text, encoding="utf-8")),
-        *write_figure(along_figure(found, time, study.vehicle), folder, NAME),
+        *write_figure(along_figure(found, time, vehicle), folder, NAME),
     ]
 
 

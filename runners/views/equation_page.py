@@ -35,9 +35,9 @@ def equations_page(study: Study) -> str:
     ------
     MissingSymPyError
     """
-    assert study.vehicle is not None
-    parts = [HEAD.format(vehicle=study.vehicle.name)]
-    for number, equation in report_equations(study.vehicle).items():
+    vehicle = study.vehicle_for("a page of the equations 4-1 to 4-13")
+    parts = [HEAD.format(vehicle=vehicle.name)]
+    for number, equation in report_equations(vehicle).items():
         lines = [equation_latex(study, number), *(equation_latex(study, number, by) for by in _shown(study, equation))]
         parts.append(f"## {number}\n\n" + "\n\n".join(f"```math\n{line}\n```" for line in lines) + "\n")
     return "\n".join(parts)
@@ -45,8 +45,8 @@ def equations_page(study: Study) -> str:
 
 def _shown(study: Study, equation: ReportEquation) -> list[str]:
     """Return tables and parameters of an equation, of those that differ only by mode or tank the first."""
-    assert study.vehicle is not None
-    tanks = "|".join(re.escape(t.name) for t in study.vehicle.slosh) or "$^"
+    vehicle = study.vehicle_for("a page of the equations 4-1 to 4-13")
+    tanks = "|".join(re.escape(t.name) for t in vehicle.slosh) or "$^"
     names = [n for g in study.system.tables for n in g.names] + list(study.system.parameter_names)
     shown: dict[str, str] = {}
     for name in equation.depends_on():

@@ -9,7 +9,6 @@ import xarray as xr
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
-from ...model.errors import UnknownNameError
 from ..case.case import Case
 from ..case.provenance import provenance
 from ..present.style import STYLE, words
@@ -40,9 +39,7 @@ def mean_comparison(study: Case) -> xr.Dataset:
     DataError
         If the mean flight is unstable.
     """
-    if study.vehicle is None:
-        raise UnknownNameError("mean flight of a system of one's own", study.system.name, [])
-    planar = planar_mean(study.vehicle, study.executable)
+    planar = planar_mean(study.vehicle_for("the mean flight"), study.executable)
     group = next(g for g in study.linear_means.groups if g.kind == "mean")
     columns = [group.names.index(f"mean.{name}") for name in RESPONSES]
     whole = group.evaluate(planar.times)[:, columns]

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ...model.equations.load_components import component_columns
 from ...model.equations.noise_loads import noise_load
 from ...model.equations.station_loads import StationLoads, load_station_loads
-from ...model.errors import IntegrationError, UnknownNameError
+from ...model.errors import IntegrationError
 from ...model.system.linear_system import COMBINED
 from ...model.vehicle.columns import local_load_columns
 from ...model.vehicle.noise_loads import loading_noises
@@ -55,11 +55,10 @@ def moments_along_vehicle(
     ------
     DataError, TimeRangeError, DirectNoiseError, IntegrationError
     """
-    if study.vehicle is None:
-        raise UnknownNameError("vehicle of a system of one's own", study.system.name, [])
-    loads = load_station_loads(study.vehicle)
-    tanks = [tank.name for tank in study.vehicle.slosh]
-    names = list(component_columns(len(study.vehicle.bending), tanks, loading_noises(study.vehicle.file)))
+    vehicle = study.vehicle_for("the bending moment along the vehicle")
+    loads = load_station_loads(vehicle)
+    tanks = [tank.name for tank in vehicle.slosh]
+    names = list(component_columns(len(vehicle.bending), tanks, loading_noises(vehicle.file)))
     components = _with_components(study)
     if engine is None:
         engine = "covariance" if study.executable.shared_library is None else "sweep"
@@ -90,7 +89,7 @@ def moments_along_vehicle(
         | {
             "engine": found.attrs["engine"],
             "slosh_reaction": str(slosh_reaction).lower(),
-            "noise_loads": study.vehicle.file.options.noise_loads,
+            "noise_loads": vehicle.file.options.noise_loads,
         },
     )
     for name in dataset:
@@ -100,8 +99,7 @@ def moments_along_vehicle(
 
 def _with_components(study: Study) -> Study:
     """Return the study with the quantities that moments are made of as outputs."""
-    vehicle = study.vehicle
-    assert vehicle is not None
+    vehicle = study.vehicle_for("the bending moment along the vehicle")
     wanted = dict.fromkeys((*vehicle.file.options.extra_outputs, "load_components"))
     options = vehicle.file.options.model_copy(update={"extra_outputs": tuple(wanted)})
     vehicle = replace(vehicle, file=vehicle.file.model_copy(update={"options": options}))
@@ -113,26 +111,26 @@ def station_rows(
     study: Study, loads: StationLoads, times: NDArray[np.float64], slosh_reaction: bool
 ) -> NDArray[np.float64]:
     """Return K, the coefficient of each component at each station, (times, stations, components)."""
-    assert study.vehicle is not None
-    tanks = [tank.name for tank in study.vehicle.slosh]
+    vehicle = study.vehicle_for("the bending moment along the vehicle")
+    tanks = [tank.name for tank in vehicle.slosh]
     times = np.array([interval_before(study.executable, node).high for node in time_nodes(study.executable, times)])
     columns = loads.at(times)
     zero = np.zeros((times.size, loads.station.size))
     columns |= {f"slosh_displacement_{tank}": zero for tank in tanks}
-    if not study.vehicle.file.options.local_angle_of_attack:
-        columns |= {column.name: zero for column in local_load_columns(len(study.vehicle.bending))}
+    if not vehicle.file.options.local_angle_of_attack:
+        columns |= {column.name: zero for column in local_load_columns(len(vehicle.bending))}
     at = [study.tables(float(time)) for time in times]
     flight = {name: np.array([tables[name] for tables in at])[:, None] for name in at[0]}
     if slosh_reaction:
         columns |= _with_reaction(columns, loads, tanks, flight)
-    file, area = study.vehicle.file, study.parameters["reference_area"].value
+    file, area = vehicle.file, study.parameters["reference_area"].value
     noises = loading_noises(file)
     means = flight["mean.angle_of_attack"], flight["mean.engine_angle"]
     for name, tables in noises.items():
         columns[f"relative_deviation_{name}"] = noise_load(
             tables, file.options.noise_loads, columns, flight, area, *means
         )
-    wanted = component_columns(len(study.vehicle.bending), tanks, noises)
+    wanted = component_columns(len(vehicle.bending), tanks, noises)
     return np.stack([columns[c] for c in wanted.values()], axis=2)
 
 

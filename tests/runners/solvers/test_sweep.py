@@ -29,7 +29,7 @@ from ascentwind.runners.solvers.adjoint import AdjointSolver
 from ascentwind.runners.solvers.cores import available_cores
 from ascentwind.runners.solvers.covariance import covariance_equation
 from ascentwind.runners.solvers.mean_response import with_mean_tables
-from ascentwind.runners.solvers.sweep import BatchError, batch, sweep, with_sweep_mean_tables
+from ascentwind.runners.solvers.sweep import BatchError, batch, forward_mean, sweep
 from ascentwind.runners.statistics.cvodes import Cvodes
 
 VEHICLE = built_in_vehicles()["as504"]
@@ -198,7 +198,7 @@ def test_weighting_functions_are_the_adjoint_runs(as504):
 
 def test_mean_tables_are_those_of_cvodes(as504):
     engine, expected, executable = as504
-    found = with_sweep_mean_tables(engine, executable)
+    found = with_mean_tables(executable, forward_mean(engine))
     for ours, theirs in zip(found.groups, expected.groups, strict=True):
         scale = np.abs(theirs.coefficients).max(axis=(0, 1))
         scale[scale == 0] = 1.0
