@@ -87,7 +87,7 @@ def read_csv_table(
     DataError
         Missing file, header without units, a cell that is not a finite number, rows out of order or repeated.
     """
-    rows = _read_rows(file)
+    rows = read_rows(file)
     if len(rows) < (2 if order == "any" else 3):
         raise DataError(f"needs a header and at least {'one row' if order == 'any' else 'two rows'}", file=file)
     (header_line, header), body = rows[0], rows[1:]
@@ -132,10 +132,15 @@ def read_csv_table(
     return table
 
 
-def _read_rows(file: Path) -> list[tuple[int, list[str]]]:
+def read_rows(file: Path) -> list[tuple[int, list[str]]]:
     """Return line number and cells of every line that is neither empty nor a comment, trailing blank columns left out.
 
     Each line is read by itself: a quote left open in one cannot swallow the next.
+
+    Raises
+    ------
+    DataError
+        The file cannot be read or is no UTF-8 text, or a line is no row of cells.
     """
     rows = []
     for number, line in enumerate(read_text(file).split("\n"), start=1):

@@ -12,6 +12,7 @@ from pydantic import WrapValidator
 from ..errors import DataError
 
 LARGEST = 64 * 2**20  # bytes
+SHIPPED = Path(__file__).parents[1]  # installers may make every file in there a link into a cache of theirs
 
 
 class OwnPath(str):
@@ -47,14 +48,15 @@ def file_inside(folder: Path, name: str) -> Path:
     Raises
     ------
     DataError
-        It leads out of the folder by a link, is no regular file, or is larger than ``LARGEST``. A file that is not
-        there is no error here.
+        It leads out of the folder by a link, unless the package came with it, is no regular file, or is larger than
+        ``LARGEST``. A file that is not there is no error here.
     """
     path = folder / name
     if isinstance(name, OwnPath):
         return path
     try:
-        if not path.resolve().is_relative_to(folder.resolve()):
+        inside = path.resolve().is_relative_to(folder.resolve())
+        if not inside and not path.absolute().is_relative_to(SHIPPED):
             raise DataError("is a link that leads out of the folder; copy the file into it", file=path)
         status = path.stat()
     except FileNotFoundError:

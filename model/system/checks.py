@@ -64,6 +64,26 @@ def scalar_expression(kind: str, name: str, value: Any) -> ca.SX:
     return expression
 
 
+def mapping(what: str, given: Any, left_out: bool = False) -> Mapping[str, Any]:
+    """Return a mapping by name; an empty one for None that may be left out.
+
+    Raises
+    ------
+    SystemDefinitionError
+        If it is none, or has a name that is no text.
+    """
+    if given is None and left_out:
+        return {}
+    if not isinstance(given, Mapping):
+        raise SystemDefinitionError(
+            f"{what}: {type(given).__name__} {_short(given)} is no mapping; give them by name, such as {{'x': ...}}"
+        )
+    for name in given:
+        if not isinstance(name, str):
+            raise SystemDefinitionError(f"{what}: the name {_short(name)} is {type(name).__name__}; names are text")
+    return given
+
+
 def pair(kind: str, name: str, value: Any, what: str) -> tuple[Any, Any]:
     """Return the two entries of a mapping's value.
 
@@ -170,7 +190,7 @@ def check_span(where: str, start: float, end: float) -> None:
     SystemDefinitionError
     """
     finite_number(f"{where}: the time", "start", start)
-    if end != math.inf:
+    if not (isinstance(end, Real) and end == math.inf):
         finite_number(f"{where}: the time", "end", end)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import casadi as ca
 import numpy as np
 
-from .checks import check_keys, finite_number, pair, scalar_expression, scalar_symbol
+from .checks import check_keys, finite_number, mapping, pair, scalar_expression, scalar_symbol
 from .labels import Noise, Output, Parameter, State
 from .linear_system import LinearSystem
 
@@ -73,8 +73,11 @@ def define_system(
     >>> lag.sources
     ('gust',)
     """
-    units, scales, sources = units or {}, scales or {}, sources or {}
-    parameters, inputs = parameters or {}, inputs or {}
+    states, noises, outputs = mapping("states", states), mapping("noises", noises), mapping("outputs", outputs)
+    parameters, inputs = mapping("parameters", parameters, left_out=True), mapping("inputs", inputs, left_out=True)
+    sources, units = mapping("sources", sources, left_out=True), mapping("units", units, left_out=True)
+    scales = mapping("scales", scales, left_out=True)
+    start_covariance = mapping("start_covariance", start_covariance, left_out=True)
     check_keys("state, output or parameter", units, (*states, *outputs, *parameters))
     check_keys("state or output", scales, (*states, *outputs))
     check_keys("noise", sources, noises)
@@ -103,8 +106,8 @@ def define_system(
         ),
         input_names=tuple(inputs),
         input_values=column(scalar_expression("the value of input", n, value) for n, (_, value) in known.items()),
-        start_covariance=start_covariance or {},
-        discontinuities=tuple(discontinuities),
+        start_covariance=start_covariance,
+        discontinuities=discontinuities,  # pyright: ignore[reportArgumentType]  # made a tuple, or refused, there
         start=start,
         end=end,
         structure={

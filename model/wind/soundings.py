@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import datetime
 import itertools
 from dataclasses import dataclass
@@ -12,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import DataError, suggestion
+from ..files.csv_table import read_rows
 from ..files.numbers import parse_number
 from .record import WindOrigin
 from .statistics import LARGEST_ALTITUDE, LOWEST_ALTITUDE, TwoComponentStatistics, WindStatistics
@@ -133,15 +133,7 @@ def read_soundings(file: Path, drop_incomplete: bool = False) -> Soundings:
         Missing file or column, a unit other than SI, a value that is no number, a missing or repeated level, a
         missing-value code such as -9999 or 99.9 (left out with ``drop_incomplete``), an outlier.
     """
-    try:
-        text = file.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise DataError(f"cannot be read ({error}); give a CSV file of soundings", file=file) from None
-    rows = [
-        (number, cells)
-        for number, cells in enumerate(csv.reader(text.splitlines()), start=1)
-        if any(c.strip() for c in cells) and not cells[0].lstrip().startswith("#")
-    ]
+    rows = read_rows(file)
     if not rows:
         raise DataError("holds no rows", file=file)
     header = [c.strip() for c in rows[0][1]]

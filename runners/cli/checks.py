@@ -11,7 +11,7 @@ from rich.table import Table
 
 from ..present.terminal import console
 from .job import Job, load_study, steps
-from .terminal import Changes, VehicleArgument, results_folder
+from .terminal import Changes, VehicleArgument, results_folder, whole
 
 WIDE = 150  # columns: tables that a narrow terminal wraps but a file keeps whole
 
@@ -21,8 +21,8 @@ def verify(
     times: Annotated[
         str | None, typer.Option(help="End times in s: START:STOP:STEP or T1,T2,...; four of the vehicle's without it.")
     ] = None,
-    runs: Annotated[int, typer.Option(help="Simulated flights of the ensemble.")] = 500,
-    seed: Annotated[int, typer.Option(help="Of the ensemble's noise.")] = 504,
+    runs: Annotated[int, typer.Option(parser=whole, help="Simulated flights of the ensemble.")] = 500,
+    seed: Annotated[int, typer.Option(parser=whole, help="Of the ensemble's noise.")] = 504,
     out: Annotated[Path | None, typer.Option(help="Folder for a figure of sample paths; none without it.")] = None,
     changes: Changes = None,
 ) -> None:
@@ -35,9 +35,10 @@ def verify(
 
     ensemble = Ensemble(runs=runs, seed=seed, paths=min(30, runs) if out else 0)
     study = load_study(vehicle, changes, [] if times else ["default_times"])
-    job = Job(out) if out else None
     flown = study.vehicle_for("default times")
     end_times = parse_times(times) if times else spread_over(parse_times(flown.file.default_times), 4)
+    study.checked_times(end_times)
+    job = Job(out) if out else None
     with console.status("computing with every engine"):
         found = run_verification(study, end_times, ensemble)
     _print_verification(found)
@@ -102,6 +103,7 @@ def tolerance(
     study = load_study(vehicle, changes)
     flown = study.vehicle_for("default times")
     end_times = end_times or [time_of_greatest_dynamic_pressure(flown)]
+    study.checked_times(end_times)
     named = times or f"{end_times[0]:g}"
     job = Job(out or results_folder(vehicle, "tolerance"))
     with steps("tolerances", len(TOLERANCES)) as bar:

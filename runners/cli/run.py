@@ -11,7 +11,7 @@ from rich.table import Table
 from ...model.errors import AscentwindError, UnusedOptionError
 from ..present.terminal import console, errors
 from .job import SHOWN, Job, load_study, steps
-from .terminal import Changes, VehicleArgument, parse_changes, results_folder
+from .terminal import Changes, VehicleArgument, number, parse_changes, results_folder
 
 if TYPE_CHECKING:
     from ..statistics.peak_check import PeakCheck
@@ -27,7 +27,9 @@ def run(
         str | None, typer.Option(help="sweep, cvodes, covariance or ensemble; the sweep where a compiler is found.")
     ] = None,
     method: Annotated[str | None, typer.Option(help="CVODES formulas, adams or bdf; chooses cvodes.")] = None,
-    tolerance: Annotated[float | None, typer.Option(help="Relative tolerance of the integration.")] = None,
+    tolerance: Annotated[
+        float | None, typer.Option(parser=number, help="Relative tolerance of the integration.")
+    ] = None,
     changes: Changes = None,
     along_vehicle: Annotated[
         str | None,

@@ -28,14 +28,18 @@ def sensitivity(
     """Which parameter, second of a table and kilometre of wind drives a response: exact derivatives, ranked."""
     from ..case.times import parse_time_or_peak
     from ..sensitivity.report import print_sensitivity, write_sensitivity
+    from ..sensitivity.request import Request
 
     at = parse_time_or_peak(time)
     if quantity == "mean":
         refuse_unused(context, ["source"], "with --quantity mean, to which no noise contributes")
     study = load_study(vehicle, changes, ["title"] if at != "peak" else ["title", "default_times"])
+    asked = Request.of(study, response or study.system.output_names[0], source, quantity)
+    if at != "peak":
+        study.checked_times([at])
     job = Job(out or results_folder(vehicle, "sensitivity"))
     with console.status("finding the peak and differentiating" if at == "peak" else "differentiating"):
-        found = study.sensitivity(response or study.system.output_names[0], at, source=source, quantity=quantity)
+        found = study.sensitivity(asked.response, at, source=source, quantity=quantity)
     print_sensitivity(found, console)
     job.replace_earlier("sensitivity", study.system.name)
     job.written += write_sensitivity(found, job.folder)

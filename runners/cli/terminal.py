@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import codecs
 import io
+import re
 import sys
 import tomllib
 from collections.abc import Sequence
@@ -13,6 +14,7 @@ from typing import Annotated, Any
 import typer
 
 from ...model.errors import DataError, UnusedOptionError
+from ...model.files.numbers import parse_number
 
 # for consoles whose encoding has no such character
 _PLAIN = {"σ": "sigma", "±": "+-", "·": ".", "²": "2", "₂": "2", "µ": "u", "–": "-", "…": "..."}
@@ -55,6 +57,21 @@ Changes = Annotated[
     list[str] | None,
     typer.Option("--set", help="KEY=VALUE in the place of vehicle.toml's, e.g. options.full_coupling=true."),
 ]
+
+
+def number(typed: str | float) -> float:
+    """Return a number typed as an option, in the notation of files: neither '1_0' nor 'nan'."""
+    try:
+        return parse_number(str(typed))
+    except ValueError as error:
+        raise typer.BadParameter(f"{error}; write it such as 12.5 or 1e-6") from None
+
+
+def whole(typed: str | int) -> int:
+    """Return a whole number typed as an option: neither '1_0' nor '1.5'."""
+    if not re.fullmatch(r"[+-]?[0-9]{1,18}", str(typed).strip()):
+        raise typer.BadParameter(f"'{str(typed)[:40]}' is not a whole number; write it such as 12")
+    return int(typed)
 
 
 def parse_changes(texts: Sequence[str]) -> dict[str, Any]:

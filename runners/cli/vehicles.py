@@ -12,6 +12,7 @@ from ...model.errors import OutputFolderError
 from ...model.vehicle.shipped import built_in_vehicles
 from ..present.terminal import console
 from .job import Job, print_files, steps
+from .terminal import number
 
 
 def vehicles() -> None:
@@ -45,7 +46,7 @@ def build_vehicle(
     figures: Annotated[
         Path | None, typer.Option(help="Folder for figures; figures/ in the vehicle's without it.")
     ] = None,
-    spacing: Annotated[float, typer.Option(help="Seconds between rows.")] = 1.0,
+    spacing: Annotated[float, typer.Option(parser=number, help="Seconds between rows.")] = 1.0,
 ) -> None:
     """The tables of a vehicle from masses, tanks, stiffness, aerodynamics, engines and programme; with figures."""
     from ..construct.build_vehicle import build_vehicle as build

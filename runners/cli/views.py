@@ -10,12 +10,12 @@ import typer
 from ...model.errors import DataError
 from ..present.terminal import console
 from .job import load_study
-from .terminal import Changes, VehicleArgument, refuse_unused
+from .terminal import Changes, VehicleArgument, number, refuse_unused
 
 
 def inspect(
     vehicle: VehicleArgument,
-    time: Annotated[float, typer.Option(help="Flight time, s.")],
+    time: Annotated[float, typer.Option(parser=number, help="Flight time, s.")],
     json: Annotated[bool, typer.Option("--json", help="As JSON instead of tables.")] = False,
     changes: Changes = None,
 ) -> None:

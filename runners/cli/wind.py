@@ -12,7 +12,7 @@ from rich.table import Table
 from ...model.errors import DataError, OutputFolderError
 from ..present.terminal import console
 from .job import Job, load_study, steps
-from .terminal import Changes, VehicleArgument, given, refuse_unused
+from .terminal import Changes, VehicleArgument, given, number, refuse_unused, whole
 
 if TYPE_CHECKING:
     from ...model.wind.shaping_filter import ShapingFilter
@@ -22,7 +22,7 @@ wind = typer.Typer(no_args_is_help=True, help="Wind statistics, and filters that
 Period = Annotated[str, typer.Option(help="Month in English, or annual.")]
 Component = Annotated[str, typer.Option(help="zonal or meridional.")]
 Edition = Annotated[str, typer.Option(help="Range Reference Atmosphere: 1983 or 2006.")]
-Top = Annotated[float, typer.Option(help="Highest level, m.")]
+Top = Annotated[float, typer.Option(parser=number, help="Highest level, m.")]
 Soundings = Annotated[Path | None, typer.Option(help="CSV of soundings instead of the shipped tables.")]
 Out = Annotated[Path, typer.Option(help="Folder for results.")]
 
@@ -90,10 +90,13 @@ def apply(
     component: Component,
     azimuth: Annotated[
         float | None,
-        typer.Option(help="Of the flight, deg from north towards east; construction.toml's without it."),
+        typer.Option(parser=number, help="Of the flight, deg from north towards east; construction.toml's without it."),
     ] = None,
     sign: Annotated[
-        int, typer.Option(help="1: +Y is the component's positive direction, east or north; -1: west or south.")
+        int,
+        typer.Option(
+            parser=whole, help="1: +Y is the component's positive direction, east or north; -1: west or south."
+        ),
     ] = 1,
     period: Period = "march",
     edition: Edition = "1983",
@@ -171,9 +174,9 @@ def fit(
     method: Annotated[
         str, typer.Option(help="state-space, constrained-response, impulse-response, ...")
     ] = "state-space",
-    order: Annotated[int | None, typer.Option(help="Number of states; 3 where the method allows it.")] = None,
-    noises: Annotated[int, typer.Option(help="White noises that drive the filter; state-space only.")] = 1,
-    time_limit: Annotated[float, typer.Option(help="Seconds.")] = 60.0,
+    order: Annotated[int | None, typer.Option(parser=whole, help="States; 3 where the method allows it.")] = None,
+    noises: Annotated[int, typer.Option(parser=whole, help="White noises that drive it; state-space only.")] = 1,
+    time_limit: Annotated[float, typer.Option(parser=number, help="Seconds.")] = 60.0,
     out: Annotated[Path, typer.Option(help="File for the filter.")] = Path("wind_filter.json"),
 ) -> None:
     """Synthesise a filter by any method and write it; 'ascentwind wind apply' puts a whole wind into a vehicle."""
@@ -221,7 +224,7 @@ def check(
     edition: Edition = "1983",
     top: Top = 16000.0,
     soundings: Soundings = None,
-    profiles: Annotated[int, typer.Option(help="Simulated profiles.")] = 5000,
+    profiles: Annotated[int, typer.Option(parser=whole, help="Simulated profiles.")] = 5000,
 ) -> None:
     """Hold a filter against data: covariances by the adjoint, intervals, poles, and an ensemble of profiles."""
     from ...model.wind.filter_file import read_filter
@@ -263,10 +266,10 @@ def plot(
     from ..wind.fitting.analytic_fits import fit_deviation
     from ..wind.verification import verify
 
-    job = Job(out)
     shaping_filter = read_filter(filter_file)
     s = _statistics_of(context, shaping_filter, period, component, edition, top, soundings)
     loaded = load_vehicle(find_vehicle(vehicle))
+    job = Job(out)
     time = np.linspace(loaded.start, loaded.end, 1000)
     altitude = loaded.tables["altitude"].polynomial(time)
     keep = altitude <= shaping_filter.altitude[-1]
@@ -285,7 +288,7 @@ def plot(
 @wind.command()
 def compare(
     vehicle: VehicleArgument,
-    time: Annotated[float | None, typer.Option(help="End time, s; greatest dynamic pressure without it.")] = None,
+    time: Annotated[float | None, typer.Option(parser=number, help="End time, s; of greatest q without it.")] = None,
     response: Annotated[str, typer.Option(help="Response.")] = "bending_moment",
     changes: Changes = None,
 ) -> None:

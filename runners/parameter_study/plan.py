@@ -53,6 +53,9 @@ class GridQuantity(PlannedQuantity):
     def _one_list(self) -> Self:
         if bool(self.values) == (self.linspace is not None):
             raise ValueError("needs either values = [...] or linspace = [first, last, count]")
+        if len(set(self.values)) < len(self.values):
+            twice = next(v for i, v in enumerate(self.values) if v in self.values[:i])
+            raise ValueError(f"has the value {twice:g} twice; keep each once")
         return self
 
     @property

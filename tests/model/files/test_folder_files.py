@@ -12,6 +12,7 @@ from ascentwind.model import load_vehicle
 from ascentwind.model.construction.construction_file import load_construction
 from ascentwind.model.equations.station_loads import load_station_loads
 from ascentwind.model.errors import DataError
+from ascentwind.model.files import folder_files
 from ascentwind.model.files.folder_files import LARGEST
 from ascentwind.model.files.toml_file import read_toml
 from ascentwind.model.vehicle.shipped import built_in_vehicles
@@ -201,3 +202,19 @@ def test_a_copy_takes_nothing_from_outside(vehicle_folder, tmp_path, secret):
     assert not made & {"circle", "elsewhere", "notes.txt", "more.csv", "pipe"}
     copied = tmp_path / "copy" / "construction" / "inside.csv"
     assert not copied.is_symlink() and copied.read_bytes() == (vehicle_folder / "rigid_body.csv").read_bytes()
+
+
+def test_a_shipped_vehicle_may_be_a_folder_of_links(tmp_path, monkeypatch):
+    """As 'uv pip install --link-mode symlink' leaves it; anyone else's folder of links is refused."""
+    cache, package = tmp_path / "cache" / "as504", tmp_path / "package" / "vehicles" / "as504"
+    shutil.copytree(AS504, cache)
+    package.mkdir(parents=True)
+    for file in cache.rglob("*"):
+        linked = package / file.relative_to(cache)
+        linked.mkdir() if file.is_dir() else linked.symlink_to(file)
+    with pytest.raises(DataError, match="leads out of the folder"):
+        load_vehicle(package)
+    monkeypatch.setattr(folder_files, "SHIPPED", tmp_path / "package")
+    assert load_vehicle(package).tables.keys() == load_vehicle(AS504).tables.keys()
+    copy_vehicle(package, tmp_path / "copy")
+    assert not any(path.is_symlink() for path in (tmp_path / "copy").rglob("*"))

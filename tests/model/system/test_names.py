@@ -20,7 +20,13 @@ from ascentwind.codegen.toolchain.c_printer import enumerators
 from ascentwind.codegen.toolchain.compiler import find_compiler
 from ascentwind.codegen.toolchain.templates import comment
 from ascentwind.model import LinearSystem, define_system
-from ascentwind.model.errors import NonlinearSystemError, NotPicklableError, SystemDefinitionError, UnknownNameError
+from ascentwind.model.errors import (
+    NonlinearSystemError,
+    NotPicklableError,
+    SystemDefinitionError,
+    TimeRangeError,
+    UnknownNameError,
+)
 from ascentwind.model.system.names import file_name
 from ascentwind.runners import Study
 
@@ -190,6 +196,27 @@ def test_what_a_system_cannot_be_made_of_is_said_by_name(changes, message):
 def test_misspelt_names_are_refused_with_the_nearest(changes, message):
     with pytest.raises(UnknownNameError, match=message):
         lag(**changes)
+
+
+KINDS = (
+    True, 5.0, "x", [1.0], (1, 2), object(), 1 + 2j, {1: 2}, range(3), lambda: 1, np.zeros((2, 2)), {2.0}, iter([2.0]),
+    ca.SX.sym("q"), ca.MX.sym("q"), ca.DM([1.0, 2.0]),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("value", KINDS, ids=lambda v: type(v).__name__)
+@pytest.mark.parametrize(
+    "key", ["states", "noises", "outputs", "parameters", "inputs", "sources", "units", "scales", "start_covariance"]
+)
+def test_what_is_no_mapping_by_name_is_refused(key, value):
+    with pytest.raises(SystemDefinitionError, match=rf"{key}: .*(is no mapping|names are text)"):
+        lag(**{key: value})
+
+
+@pytest.mark.parametrize("value", [5.0, True, None, object(), ca.SX.sym("q"), ["x"], [None], [float("nan")], [2 + 1j]])
+def test_what_is_no_list_of_times_is_refused(value):
+    with pytest.raises(TimeRangeError, match="discontinuities"):
+        lag(discontinuities=value)
 
 
 def test_one_symbol_stands_for_one_thing():
