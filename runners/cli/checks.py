@@ -29,9 +29,9 @@ def verify(
     """The same statistics by independent engines, with a verdict; exit code 1 when they disagree."""
     from ..case.times import parse_times, spread_over
     from ..present.style import write_figure
+    from ..statistics.agreement import agreement
     from ..statistics.ensemble import Ensemble
     from ..statistics.figures import sample_path_figure
-    from ..statistics.verify import verify as run_verification
 
     ensemble = Ensemble(runs=runs, seed=seed, paths=min(30, runs) if out else 0)
     study = load_study(vehicle, changes, [] if times else ["default_times"])
@@ -40,8 +40,8 @@ def verify(
     study.checked_times(end_times)
     job = Job(out) if out else None
     with console.status("computing with every engine"):
-        found = run_verification(study, end_times, ensemble)
-    _print_verification(found)
+        found = agreement(study, end_times, ensemble)
+    _print_agreement(found)
     if job:
         with console.status("drawing sample paths"):
             start, last = study.system.start, max(end_times)
@@ -56,10 +56,10 @@ def verify(
         raise typer.Exit(1)
 
 
-def _print_verification(found) -> None:
+def _print_agreement(found) -> None:
     from ..present.style import display, words
+    from ..statistics.agreement import REFERENCE
     from ..statistics.engines import ENGINES
-    from ..statistics.verify import REFERENCE
 
     reference, ensemble = found.statistics[REFERENCE], found.statistics["ensemble"]
     table = Table("time", "response", "source", title="Standard deviations by independent engines")

@@ -25,7 +25,7 @@ FALSE_ALARM = 1e-3  # chance that a right ensemble is called wrong, all entries 
 
 
 @dataclass(frozen=True, eq=False)
-class Verification:
+class Agreement:
     """What the engines found.
 
     Attributes
@@ -95,7 +95,7 @@ class Verification:
         )
 
 
-def verify(case: Case, times: list[float], ensemble: Ensemble, progress: Progress | None = None) -> Verification:
+def agreement(case: Case, times: list[float], ensemble: Ensemble, progress: Progress | None = None) -> Agreement:
     """Compute the statistics with every engine at a tight setting and compare.
 
     Parameters
@@ -126,7 +126,7 @@ def verify(case: Case, times: list[float], ensemble: Ensemble, progress: Progres
     wide = 1 - FALSE_ALARM / (2 * std.size)  # Bonferroni: the chances of all entries, means and deviations, add up
     in_std = _inside(std, std_interval(sampled.std.values, ensemble.runs, wide))
     in_mean = _inside(mean, mean_interval(sampled.mean.values, sampled.std.values, ensemble.runs, wide))
-    return Verification(
+    return Agreement(
         statistics,
         differences,
         mean_differences,

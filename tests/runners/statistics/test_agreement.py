@@ -1,4 +1,4 @@
-"""Verification: engines that agree, and each way in which one can be caught."""
+"""Agreement: engines that agree, and each way in which one can be caught."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ import pytest
 from ascentwind.model import define_system
 from ascentwind.runners import Ensemble, Study
 from ascentwind.runners.cli.app import main
+from ascentwind.runners.statistics.agreement import agreement
 from ascentwind.runners.statistics.engines import ENGINES
-from ascentwind.runners.statistics.verify import verify
 
 OPTIONS = Ensemble(runs=400)
 TIMES = [1.0, 4.0]
@@ -54,7 +54,7 @@ def spoil(monkeypatch):
 
 
 def test_engines_agree(study):
-    found = verify(study, TIMES, OPTIONS)
+    found = agreement(study, TIMES, OPTIONS)
     assert found.agree, found.verdict()
     assert set(found.statistics) == set(ENGINES)
     assert all(d.max() < 1e-7 for d in found.differences.values())
@@ -65,7 +65,7 @@ def test_engines_agree(study):
 @pytest.mark.parametrize("variable", ["std", "mean"])
 def test_a_small_error_of_one_engine_is_found_and_named(study, spoil, engine, variable):
     spoil(engine, variable, 1 + 3e-6)
-    found = verify(study, TIMES, OPTIONS)
+    found = agreement(study, TIMES, OPTIONS)
     assert not found.agree
     assert ENGINES[engine].label in found.verdict()
     assert re.search(r"DISAGREE: .* differs by 3\.0e-06 in \w+ from \w+ at [14] s", found.verdict())
@@ -75,7 +75,7 @@ def test_an_error_common_to_all_equations_is_found_by_the_ensemble(study, spoil)
     for engine, entry in list(ENGINES.items()):
         if entry.tight() is not None:
             spoil(engine, "std", 1.3)
-    found = verify(study, TIMES, OPTIONS)
+    found = agreement(study, TIMES, OPTIONS)
     assert all(d.max() < 1e-7 for d in found.differences.values())
     assert re.search("lie outside the ensemble by more than chance allows", found.verdict())
 
@@ -115,6 +115,6 @@ def test_command_prints_a_table_and_ends_with_the_verdict(spoil, monkeypatch, ca
 
 
 def test_differences_are_those_of_the_tables(study):
-    found = verify(study, TIMES, OPTIONS)
+    found = agreement(study, TIMES, OPTIONS)
     a, b = (found.statistics[e].std.values for e in ("covariance", "cvodes"))
     np.testing.assert_allclose(found.differences["covariance"], np.abs(a / b - 1), atol=1e-15)
