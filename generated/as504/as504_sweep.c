@@ -48,6 +48,9 @@ enum { TABLE_VALUES_1 = 83, GROUPS_1 = 3, SOURCES_1 = 3, NOISES_1 = 4 };
 enum { A_SIZE = 189, B_SIZE = 5, KNOWN_SIZE = 8, C_SIZE = 28 };
 #define SMALLEST 1e-10
 #define MOST_STEPS 200000 /* in one call, rejected ones too */
+#define FIRST_TRY 2000.0 /* steps of a segment after which its weights are doubted */
+#define LEARNING 40000.0 /* steps with which sizes are learned, at one tolerance */
+#define LOOSEST 1e200 /* tolerance of typical sizes with which sizes are learned */
 enum { STOPPED = -1, DONE, NOT_FINITE, TOO_SMALL_A_STEP, OUT_OF_RANGE, TOO_MANY_STEPS }; /* what the exported functions return */
 enum { V_mass, V_moment_of_inertia, V_center_of_gravity, V_altitude, V_relative_velocity, V_dynamic_pressure,
        V_axial_acceleration, V_axial_drag, V_thrust, V_control_thrust, V_normal_force_slope, V_center_of_pressure,
@@ -2306,8 +2309,8 @@ typedef struct {
 typedef struct { double steps, rejected, evaluations; } Counters;
 typedef struct { double time, entry; } Failure;
 
-static int sweep_segment(Flight *f, double begin, double end, double tolerance, const Weights *w, double *first, Segment *g,
-                         Counters *count, Failure *failure, const volatile int *stop) {
+static int sweep_segment(Flight *f, double begin, double end, double tolerance, double most, const Weights *w, double *first,
+                         Segment *g, Counters *count, Failure *failure, const volatile int *stop) {
   double x[BLOCKS][STATES * LANES];
   Matrices m;
   Step s;
@@ -2321,7 +2324,7 @@ static int sweep_segment(Flight *f, double begin, double end, double tolerance, 
     const double pieces = larger(1.0, ceil((t - begin) / step * (1.0 - 1e-12)));
     const double h = (t - begin) / pieces;
     double error = 0.0, factor;
-    const int many = count->steps + count->rejected >= MOST_STEPS;
+    const int many = count->steps + count->rejected >= most;
     if (*stop) return STOPPED;
     if ((pieces > 1.0 && h < least) || many) {
       failure->time = t;
@@ -2541,26 +2544,40 @@ EXPORT int sweep(int count, double start, const double *end, const double *low, 
   memset(largest, 0, sizeof largest);
   for (k = 0; k < count && code == DONE; ++k) {
     const double begin = k ? end[k - 1] : start, length = end[k] - begin;
-    const int unknown = length > 10.0 * longest; /* the weights know nothing of effects over such a time */
+    const int tried = length <= 10.0 * longest; /* else the weights know nothing of effects over such a time */
+    int unknown = !tried;
     double *result = covariance + k * SOURCES * RESPONSES * RESPONSES;
     f.low = low[k];
     f.high = high[k];
     evaluate_output(&f, end[k], C, direct);
+    if (tried) {
+      code = sweep_segment(&f, begin, end[k], tolerance, smaller(MOST_STEPS, done.steps + done.rejected + FIRST_TRY),
+                           &weights, &step, &g, &done, &why, stop);
+      /* responses that grow a thousandfold within a segment: the weights of its start ask for too much */
+      unknown = code == TOO_SMALL_A_STEP || (code == TOO_MANY_STEPS && done.steps + done.rejected < MOST_STEPS);
+      if (code != DONE && !unknown) break;
+    }
     if (unknown) {
       /* The first segment, and one much longer than all before, is done twice: once to learn how large states and
        * responses become. It is done finer, because a flight that starts from rest changes fastest there. */
-      step = length / 16.0;
+      double loose = 0.1 * tolerance;
       memset(&weights, 0, sizeof weights);
       for (r = 0; r < STATES; ++r) weigh_by_size(size, r, &weights);
-      code = sweep_segment(&f, begin, end[k], 0.1 * tolerance, &weights, &step, &g, &done, &why, stop);
+      /* typical sizes may have missed a pulse, and would then ask for too much of it */
+      for (; unknown && loose < LOOSEST; loose *= 1e6) {
+        step = length / 16.0;
+        code = sweep_segment(&f, begin, end[k], loose, smaller(MOST_STEPS, done.steps + done.rejected + LEARNING), &weights,
+                             &step, &g, &done, &why, stop);
+        unknown = code == TOO_SMALL_A_STEP || (code == TOO_MANY_STEPS && done.steps + done.rejected < MOST_STEPS);
+      }
       if (code != DONE) break;
       forward(&g, C, P, P_next, result, inherited);
       carry_mean(&g, m, next);
       respond(C, direct, next, mean + k * RESPONSES);
       weigh(C, &g, P_next, result, next, mean + k * RESPONSES, size, &weights);
+      code = sweep_segment(&f, begin, end[k], 0.1 * tolerance, MOST_STEPS, &weights, &step, &g, &done, &why, stop);
+      if (code != DONE) break;
     }
-    code = sweep_segment(&f, begin, end[k], unknown ? 0.1 * tolerance : tolerance, &weights, &step, &g, &done, &why, stop);
-    if (code != DONE) break;
     forward(&g, C, P, P_next, result, inherited);
     memcpy(P, P_next, SOURCES * STATES * STATES * sizeof(double));
     for (j = 0; j < STATES; ++j) made = larger(j ? made : 0.0, g.error[j]);

@@ -31,6 +31,7 @@ from ascentwind.runners.solvers.covariance import covariance_equation
 from ascentwind.runners.solvers.mean_response import with_mean_tables
 from ascentwind.runners.solvers.sweep import BatchError, batch, forward_mean, sweep
 from ascentwind.runners.statistics.cvodes import Cvodes
+from ascentwind.runners.study import Study
 
 VEHICLE = built_in_vehicles()["as504"]
 START = np.diag([1.0, 3.0, 1.0])  # any covariance of the wind filter's states serves for a comparison
@@ -348,3 +349,14 @@ def test_source_is_the_same_from_two_processes():
     system = assemble(load_vehicle(VEHICLE), START)
     here = hashlib.sha256(sweep_source(system, sweep_functions(system)).encode()).hexdigest()
     assert digests == [here, here]
+
+
+@pytest.mark.parametrize("width", [0.3, 0.03, 0.003, 0.001])
+def test_smooth_pulses_grow_within_a_segment(width):
+    """Of white noise through 10 exp(-((t - 5) / w)^2 / 2) into x' = -x: var(6) = 100 sqrt(pi) w exp(w^2 - 2)."""
+    t, x, n = (ca.SX.sym(name) for name in ("t", "x", "n"))
+    pulse = 10 * ca.exp(-0.5 * ((t - 5) / width) ** 2)
+    system = define_system("pulse", time=t, states={"x": (x, -x + pulse * n)}, noises={"n": n}, outputs={"x": x})
+    exact = 10 * np.sqrt(np.sqrt(np.pi) * width * np.exp(width**2 - 2))
+    std = Study.from_system(system).response_statistics([6.0], engine="sweep").std.values[0, 0, 0]
+    assert std == pytest.approx(exact, rel=1e-7)
