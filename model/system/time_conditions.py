@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import cast
 
 import casadi as ca
 import numpy as np
@@ -127,7 +128,7 @@ def find_conditions(
     """
     depends: dict[int, int] = {}
     for symbols, what in ((time, _TIME), (p, 0), (tables, _TABLE), (signals, _SIGNAL)):
-        depends |= {symbol.element_hash(): what for symbol in symbols.elements()}
+        depends |= {symbol.element_hash(): what for symbol in cast("list[ca.SX]", symbols.elements())}
     found: dict[tuple[int, bool], Condition] = {}
     for integrated, group in ((True, expressions), (False, outputs)):
         for e in _unfolded(group, depends):
@@ -161,7 +162,7 @@ def find_conditions(
 
 def _unfolded(expressions: Sequence[ca.SX], done: Mapping[int, int]) -> Iterator[ca.SX]:
     """Yield every operation in expressions that is not done, after its operands; the caller marks each as done."""
-    stack = [element for expression in expressions for element in expression.nonzeros()]
+    stack = [element for expression in expressions for element in cast("list[ca.SX]", expression.nonzeros())]
     while stack:
         e = stack[-1]
         missing = [] if e.element_hash() in done else [e.dep(i) for i in range(e.n_dep())]
@@ -275,7 +276,8 @@ class _Search:
             self.refuse(f"is not finite at {self.start:g} s or {self.end:g} s; see what divides by zero there")
         (offset,), (rate,), _ = self.condition.at(np.zeros(1), self.parameters)
         if rate == 0:
-            return _Found(*[np.zeros(0)] * 3, np.zeros(0, bool))
+            nowhere = np.zeros(0)
+            return _Found(nowhere, nowhere, nowhere, np.zeros(0, bool))
         levels = np.zeros(1)
         if self.condition.whole_numbers:
             first, last = np.floor(ends[0].min()), np.ceil(ends[0].max())

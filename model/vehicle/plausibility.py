@@ -126,7 +126,7 @@ class _Compared:
         warned: tuple[float, float],
         refused: tuple[float, float],
         what: str,
-        where: Array | None = None,
+        where: NDArray[np.bool_] | None = None,
         **numbers: Array | float,
     ) -> Iterator[Contradiction]:
         """Yield the time at which a measure is farthest outside of its limits, if it is outside at any.

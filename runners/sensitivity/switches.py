@@ -40,7 +40,7 @@ class SwitchGradient:
     reach: dict[int, float]
 
 
-def switch_velocities(pair: AdjointPair, stops: Stops) -> list[tuple[NDArray[np.float64], str]]:
+def switch_velocities(pair: AdjointPair, stops: Stops) -> list[NDArray[np.float64]]:
     """Return by stop dt/dp of its switches, (switches, n_p), NaN where a parameter makes or unmakes it."""
     system, p = pair.executable.system, pair.executable.parameters
     found = []
