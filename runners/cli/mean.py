@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from ..present.terminal import console
+from ..present.terminal import console, print_whole
 from .job import Job, load_study
 from .terminal import Changes, VehicleArgument
 
@@ -42,7 +42,7 @@ def mean(
             i = int(np.argmax(abs(values.values)))
             cells += [f"{float(values[i]):.4f}", f"{float(found['time'][i]):.1f}"]
         table.add_row(*cells)
-    console.print(table)
+    print_whole(table, console)
     if job:
         title = f"{study.system.name}: mean response in the mean wind"
         job.written += write_figure(mean_comparison_figure(found, title), job.folder, "mean_response")
