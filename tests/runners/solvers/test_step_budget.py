@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import casadi as ca
 import numpy as np
@@ -10,8 +11,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from ascentwind.model import define_system
-from ascentwind.model.errors import IntegrationError, StepBudgetError
+from ascentwind.model.errors import DataError, IntegrationError, StepBudgetError
 from ascentwind.runners import Ensemble, Study
+from ascentwind.runners.case.wind_start import covariance_at
 from ascentwind.runners.solvers.step_budget import at_most
 
 FAST = 3e6  # rad/s
@@ -77,12 +79,21 @@ def test_spoiled_vehicle_names_the_block(as504, engine):
 
 
 def test_spoiled_wind_filter_is_named(vehicle_folder):
+    """By the reader already, before any engine steps through it."""
     path = next(vehicle_folder.glob("wind*filter.json"))
     contents = json.loads(path.read_text())
     contents["F_per_m"] = (1e10 * np.array(contents["F_per_m"])).tolist()
     path.write_text(json.dumps(contents))
-    with pytest.raises(StepBudgetError, match="altitude of .* m of the wind filter"):
+    with pytest.raises(DataError, match=r"wind of filter 'state_space_fit' has no finite variance at \d.* m; its F"):
         Study.load(vehicle_folder)
+
+
+def test_start_of_a_wind_filter_far_too_fast_is_ended(as504):
+    """What the reader refuses in a file, a filter made in memory still can be."""
+    made = as504.vehicle.wind.shaping_filter
+    fast = replace(made, F=1e10 * made.F)
+    with pytest.raises(StepBudgetError, match="altitude of .* m of the wind filter"):
+        covariance_at(fast, 163.0)
 
 
 def test_scipy_is_ended_after_its_steps():
