@@ -1,7 +1,8 @@
 """Bounds of a scalar CasADi function over many boxes at once, by interval arithmetic.
 
 Moore, Kearfott and Cloud, Introduction to Interval Analysis, 2009. Bounds are rounded to nearest, not outward: who
-needs more than that leaves a margin of a few roundings. What has no bound here is the whole line, which is true.
+needs more than that leaves a margin of a few roundings. What has no bound here is the whole line, which is true. Only
+the whole line may hold what is not a number: comparisons make a number of that, so that no rule may narrow it again.
 """
 
 from __future__ import annotations
@@ -43,13 +44,18 @@ def bounds(function: ca.Function, arguments: list[list[Bounds]]) -> list[list[Bo
                 work[into[0]] = arguments[of[0]][of[1]]
             elif operation == ca.OP_CONST:
                 constant = np.full(shape, function.instruction_constant(k))
-                work[into[0]] = constant, constant
+                unknown = np.isnan(constant)
+                work[into[0]] = np.where(unknown, -np.inf, constant), np.where(unknown, np.inf, constant)
             elif operation == ca.OP_OUTPUT:
                 found[into[0]][into[1]] = work[of[0]]
             else:
                 rule = _RULES.get(operation)
                 low, high = rule(*(work[i] for i in of)) if rule else (np.full(shape, np.nan),) * 2
                 undefined = np.isnan(low) | np.isnan(high)
+                if operation not in _DECIDED:
+                    for i in of:
+                        below, above = np.isinf(work[i][0]), np.isinf(work[i][1])
+                        undefined |= (below | above) if operation in _UNDEFINED_AT_INFINITY else (below & above)
                 work[into[0]] = np.where(undefined, -np.inf, low), np.where(undefined, np.inf, high)
     return found
 
@@ -156,6 +162,7 @@ def _remainder(whole: Callable[[NDArray], NDArray]):
         count = whole(quotient[0])
         within = _subtract(a, _multiply((count, count), b))
         size, known = _absolute(b)[1], count == whole(quotient[1])
+        size = np.where(_holds_zero(b), np.inf, size)
         return np.where(known, within[0], -size), np.where(known, within[1], size)
 
     return rule
@@ -163,7 +170,7 @@ def _remainder(whole: Callable[[NDArray], NDArray]):
 
 def _copy_sign(a: Bounds, b: Bounds) -> Bounds:
     size = _absolute(a)
-    return np.where(b[0] >= 0, size[0], -size[1]), np.where(b[1] < 0, -size[0], size[1])
+    return np.where(b[0] > 0, size[0], -size[1]), np.where(b[1] < 0, -size[0], size[1])
 
 
 def _truth(surely: NDArray, possibly: NDArray) -> Bounds:
@@ -250,7 +257,7 @@ _RULES: dict[int, Callable[..., Bounds]] = {
     ca.OP_FMAX: lambda a, b: (np.maximum(a[0], b[0]), np.maximum(a[1], b[1])),
     ca.OP_COPYSIGN: _copy_sign,
     ca.OP_LT: lambda a, b: _truth(a[1] < b[0], a[0] < b[1]),
-    ca.OP_LE: lambda a, b: _truth(a[1] <= b[0], a[0] <= b[1]),
+    ca.OP_LE: lambda a, b: _truth((a[1] <= b[0]) & np.isfinite(a[1]), a[0] <= b[1]),
     ca.OP_EQ: _equal,
     ca.OP_NE: lambda a, b: _not(_equal(a, b)),
     ca.OP_NOT: _not,
@@ -258,3 +265,7 @@ _RULES: dict[int, Callable[..., Bounds]] = {
     ca.OP_OR: _either,
     ca.OP_IF_ELSE_ZERO: _where,
 }
+_DECIDED = {ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE, ca.OP_NOT, ca.OP_AND, ca.OP_OR, ca.OP_IF_ELSE_ZERO}
+_UNDEFINED_AT_INFINITY = {
+    ca.OP_MUL, ca.OP_DIV, ca.OP_POW, ca.OP_CONSTPOW, ca.OP_SIN, ca.OP_COS, ca.OP_TAN, ca.OP_FMOD, ca.OP_REMAINDER,
+}  # fmt: skip

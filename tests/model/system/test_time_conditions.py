@@ -9,7 +9,7 @@ from itertools import pairwise
 import casadi as ca
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
 from scipy.interpolate import PPoly
@@ -198,6 +198,8 @@ def test_a_condition_on_a_state_or_noise_is_not_linear(rate):
 
 @settings(max_examples=300, deadline=None)
 @given(st.integers(0, 10**9))
+@example(6543756)
+@example(1277)
 def test_bounds_hold_what_they_bound(seed):
     """Random expressions over random boxes: every value inside a box lies between the bounds."""
     random = np.random.default_rng(seed)
@@ -221,6 +223,26 @@ def test_bounds_hold_what_they_bound(seed):
         defined = np.isfinite(value)
         slack = np.where(defined, 1e-9 * (1 + np.abs(value)), 0.0)
         assert (~defined | ((found[0] - slack <= value) & (value <= found[1] + slack))).all(), expression[-1]
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda z: ca.logic_not(ca.fmod(2, z)),
+        lambda z: ca.fmod(2, z) < 3,
+        lambda z: ca.sin(1 / z) < 2,
+        lambda z: ca.fabs(z / z) >= 0,
+        lambda z: ca.copysign(2, ca.exp(z / z)) > 0,
+        lambda z: ca.copysign(2, -ca.exp(z / z)) > 0,
+    ],
+)
+def test_bounds_hold_what_is_made_of_no_number(make):
+    """Comparisons and signs of 0/0 and the like are numbers: z = 0 exactly, or somewhere in the box."""
+    z = ca.SX.sym("z")
+    function = ca.Function("f", [z], [make(z)])
+    ((found,),) = bounds(function, [[(np.array([0.0, -1.0]), np.array([0.0, 1.0]))]])
+    value = float(function(0))
+    assert ((found[0] <= value) & (value <= found[1])).all()
 
 
 def test_a_check_that_fails_does_not_cost_the_result(monkeypatch):
