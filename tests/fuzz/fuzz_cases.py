@@ -24,7 +24,6 @@ from typing import Any
 from unittest import mock
 
 import numpy as np
-from fuzz_legitimate import reason
 from fuzz_mutations import KINDS, Mutation, mutate
 from fuzz_systems import mutated_system
 from numpy.typing import NDArray
@@ -40,7 +39,7 @@ from ascentwind.runners import Study
 from ascentwind.runners.case.wind_start import covariance_at
 from ascentwind.runners.construct.build_vehicle import build_vehicle
 from ascentwind.runners.design.file import load_design
-from ascentwind.runners.parameter_study.plan import read_plan
+from ascentwind.runners.parameter_study.plan import ParameterStudyPlan, read_plan
 from ascentwind.runners.parameter_study.quantities import resolve_quantities
 from ascentwind.runners.parameter_study.sampling import member_values
 from ascentwind.runners.solvers.stability import check_coupling
@@ -61,8 +60,11 @@ class Outcome:
     Attributes
     ----------
     verdict : str
-        'refused', 'warned', 'unchanged' (nothing computed moves), 'legitimate' and 'not applicable' are good; 'silent',
-        'traceback', 'not finite' and 'slow' are not, nor are 'crash' and 'hang', which the caller tells.
+        'refused', 'warned', 'unchanged' (nothing computed moves) and 'not applicable' are good; 'silent' is where there
+        is a reason for it (fuzz_legitimate.py); 'traceback', 'not finite' and 'slow' are not, nor are 'crash' and
+        'hang', which the caller tells.
+    changed : float
+        By how much the statistics move, relative; 1 where the structure changes.
     """
 
     seed: int
@@ -70,11 +72,8 @@ class Outcome:
     mutation: Mutation
     verdict: str
     detail: str
+    changed: float
     seconds: float
-
-    @property
-    def good(self) -> bool:
-        return self.verdict in ("refused", "warned", "unchanged", "legitimate", "not applicable")
 
     def line(self) -> str:
         """Return it as JSON."""
@@ -89,7 +88,7 @@ def run_case(seed: int) -> Outcome:
     before = _processor_seconds()
     with tempfile.TemporaryDirectory() as work, warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        mutation, verdict, detail = Mutation(kind, "", "", ""), "not applicable", ""
+        mutation, verdict, detail, changed = Mutation(kind, "", "", ""), "not applicable", "", 0.0
         try:
             mutation, changed = _RUN[target](Path(work), kind, random)
         except AscentwindError as error:
@@ -100,22 +99,20 @@ def run_case(seed: int) -> Outcome:
         else:
             if mutation.what:
                 told = [str(w.message) for w in caught if issubclass(w.category, AscentwindWarning)]
-                verdict, detail = _judge(target, mutation, changed, [t for t in told if t not in _usual_warnings()])
+                verdict, detail = _judge(changed, [t for t in told if t not in _usual_warnings()])
     seconds = _processor_seconds() - before
     if seconds > LONGEST and verdict != "traceback":
         verdict, detail = "slow", f"{verdict}: {detail}"
-    return Outcome(seed, target, mutation, verdict, detail[:600], round(seconds, 2))
+    return Outcome(seed, target, mutation, verdict, detail[:600], changed, round(seconds, 2))
 
 
-def _judge(target: str, mutation: Mutation, changed: float, told: list[str]) -> tuple[str, str]:
+def _judge(changed: float, told: list[str]) -> tuple[str, str]:
     if told:
         return "warned", told[0]
     if not np.isfinite(changed):
         return "not finite", "statistics that are not numbers, without a word"
     if changed < UNCHANGED:
         return "unchanged", ""
-    if why := reason(target, mutation, changed):
-        return "legitimate", f"{why} (the statistics move by {changed:.2g})"
     return "silent", f"statistics move by {changed:.2g}"
 
 
@@ -267,9 +264,15 @@ def _built() -> dict[str, NDArray[np.float64]]:
         return {path.name: _numbers(path) for path in written}
 
 
-def _loaded(vehicle: str | Path) -> Study:
+def _loaded(vehicle: str | Path, **options: Any) -> Study:
     """Return a shipped vehicle, loaded once, or another one."""
-    return _usual(str(vehicle))[0] if str(vehicle) in built_in_vehicles() else LOAD(vehicle)
+    shipped = str(vehicle) in built_in_vehicles() and not any(options.values())
+    return _usual(str(vehicle))[0] if shipped else LOAD(vehicle, **options)
+
+
+@cache
+def _usual_plan() -> ParameterStudyPlan:
+    return read_plan(PLAN)
 
 
 def _plan(work: Path, kind: str, random: Random) -> tuple[Mutation, float]:
@@ -280,7 +283,9 @@ def _plan(work: Path, kind: str, random: Random) -> tuple[Mutation, float]:
     with _marked(mutation):
         plan = read_plan(work / "plan.toml")
         values = member_values(plan, resolve_quantities(_loaded(str(plan.vehicle)), plan))
-        return mutation, 1.0 if np.isfinite(values).all() else np.inf
+        if not np.isfinite(values).all():
+            return mutation, np.inf
+        return mutation, 0.0 if plan == _usual_plan() else 1.0
 
 
 def _design(work: Path, kind: str, random: Random) -> tuple[Mutation, float]:

@@ -1,11 +1,19 @@
-"""Changes that make another vehicle, not a contradiction: where no second statement of the same thing exists."""
+"""Changes that make another vehicle, not a contradiction: where no second statement of the same thing exists.
+
+``python fuzz_legitimate.py REPORT`` judges the lines of a report, counts them by verdict and prints those that are bad.
+"""
 
 from __future__ import annotations
 
+import json
 import re
+import sys
+from collections import Counter
+from pathlib import Path
 
 from fuzz_mutations import Mutation
 
+GOOD = ("refused", "warned", "unchanged", "legitimate", "not applicable")
 SMALL = 0.01
 
 # target, file, place, kinds, reason; patterns that must match whole
@@ -74,3 +82,25 @@ def reason(target: str, mutation: Mutation, changed: float) -> str | None:
         if all(re.fullmatch(pattern, text) for pattern, text in found):
             return why
     return None
+
+
+def judged(case: dict) -> dict:
+    """Return a case with the verdict 'legitimate' where it is silent and there is a reason for it."""
+    if case["verdict"] != "silent":
+        return case
+    why = reason(case["target"], Mutation(**case["mutation"]), case["changed"])
+    return case if why is None else {**case, "verdict": "legitimate", "detail": f"{why} ({case['detail']})"}
+
+
+def main() -> None:
+    """Judge a report."""
+    cases = [judged(json.loads(line)) for line in Path(sys.argv[1]).read_text(encoding="utf-8").splitlines()]
+    print(len(cases), "cases:", dict(Counter(c["verdict"] for c in cases)))
+    print("longest", max(c["seconds"] for c in cases), "s of processor time")
+    for case in cases:
+        if case["verdict"] not in GOOD:
+            print(json.dumps(case))
+
+
+if __name__ == "__main__":
+    main()
