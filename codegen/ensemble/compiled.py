@@ -5,7 +5,7 @@ from __future__ import annotations
 from ...model.system.linear_system import LinearSystem
 from ..system.executable import ExecutableSystem
 from ..toolchain.library import NoCompilerError, Recipe
-from .check import AGREEMENT, difference_from_numpy
+from .difference import AGREEMENT, difference_from_numpy
 from .simulation import CompiledEnsemble
 from .source import ensemble_fingerprint, ensemble_sizes, ensemble_source
 

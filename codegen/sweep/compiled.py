@@ -5,7 +5,7 @@ from __future__ import annotations
 from ...model.system.linear_system import LinearSystem
 from ..system.executable import ExecutableSystem
 from ..toolchain.library import Recipe
-from .check import AGREEMENT, difference_from_interpreter
+from .difference import AGREEMENT, difference_from_interpreter
 from .integrator import CompiledSweep
 from .source import SweepFunctions, sweep_fingerprint, sweep_functions, sweep_source
 

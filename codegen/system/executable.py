@@ -103,7 +103,7 @@ class ExecutableSystem:
 
 
 def executable_system(system: LinearSystem, compile: bool = True) -> ExecutableSystem:
-    """Generate, compile, load and verify a system; without a compiler, or on request, use the interpreter.
+    """Generate, compile and load a system; without a compiler, on request, or where they differ, use the interpreter.
 
     Raises
     ------

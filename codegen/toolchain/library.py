@@ -127,7 +127,7 @@ class Recipe:
         return f"{self.system.name}_{self.part}.c" if self.part else f"{self.system.name}.c"
 
     def load(self, may_compile: bool) -> Library | None:
-        """Compile, or take from the cache, and verify; return None, and say so, where the interpreter is used.
+        """Compile or take from the cache, and compare; return None, and say so, where the interpreter is used.
 
         Raises
         ------
@@ -151,7 +151,7 @@ class Recipe:
         return library
 
     def require(self, may_compile: bool) -> Library:
-        """Compile, or take from the cache, and verify what exists as compiled code only.
+        """Compile or take from the cache, and compare, what exists as compiled code only.
 
         Raises
         ------

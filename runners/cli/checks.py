@@ -31,7 +31,7 @@ def verify(
     from ..present.style import write_figure
     from ..statistics.agreement import agreement
     from ..statistics.ensemble import Ensemble
-    from ..statistics.figures import sample_path_figure
+    from ..statistics.response_figures import sample_path_figure
 
     ensemble = Ensemble(runs=runs, seed=seed, paths=min(30, runs) if out else 0)
     study = load_study(vehicle, changes, [] if times else ["default_times"])

@@ -43,9 +43,9 @@ def run(
     from ..case.times import parse_times
     from ..present.style import words, write_figure
     from ..statistics.engines import engine_from
-    from ..statistics.figures import weighting_figure
     from ..statistics.larger_side import LABEL
     from ..statistics.peak_check import weighting_at, with_peak_check
+    from ..statistics.response_figures import weighting_figure
     from ..views.along_vehicle_files import prepare_along_vehicle, write_along_vehicle
 
     settings = {"method": method, "relative_tolerance": tolerance}

@@ -50,7 +50,7 @@ def build_vehicle(
 ) -> None:
     """The tables of a vehicle from masses, tanks, stiffness, aerodynamics, engines and programme; with figures."""
     from ..construct.build_vehicle import build_vehicle as build
-    from ..construct.figures import FIGURES
+    from ..construct.vehicle_figures import FIGURES
     from ..construct.vehicle_numbers import STEPS
     from ..present.style import write_figure
 

@@ -262,7 +262,7 @@ def plot(
     from ...model.vehicle.shipped import find_vehicle
     from ...model.wind.filter_file import read_filter
     from ..present.style import write_figure
-    from ..wind.figures import coefficient_figure, covariance_figure, deviation_figure, interval_figure
+    from ..wind.filter_figures import coefficient_figure, covariance_figure, deviation_figure, interval_figure
     from ..wind.fitting.analytic_fits import fit_deviation
     from ..wind.verification import verify
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ...model.deprecation import warn_deprecated
 from ...model.errors import UnknownNameError
 from ..solvers.adjoint import AdjointSolver
 from ..solvers.integration import CvodesSettings
@@ -18,8 +19,8 @@ from .peaks import SIGNS
 from .problem import DesignProblemError, LoadReliefProblem, family_words
 from .search import ACTIVE, Search, Stationarity
 
-CLOSE = 2e-3  # of a peak: end times this close below it are verified too
-VERIFIED = 1e-6
+CLOSE = 2e-3  # of a peak: end times this close below it are recomputed too
+AGREEMENT = 1e-6
 ON_A_BOUND = 1e-12  # of the span between bounds
 
 
@@ -167,7 +168,7 @@ def design(
 
 
 @dataclass(frozen=True)
-class Verification:
+class RecomputedPeak:
     """|mean| + 3 sigma of a response at an end time, by the design's own engine and by CVODES."""
 
     response: str
@@ -182,10 +183,10 @@ class Verification:
 
     @property
     def agrees(self) -> bool:
-        return self.difference <= VERIFIED
+        return self.difference <= AGREEMENT
 
 
-def verify_design(result: DesignResult, relative_tolerance: float = 1e-11) -> list[Verification]:
+def recompute_peaks(result: DesignResult, relative_tolerance: float = 1e-11) -> list[RecomputedPeak]:
     """Compute the peaks of a design again by CVODES, the mean response included, at all end times near a peak.
 
     Raises
@@ -206,7 +207,7 @@ def verify_design(result: DesignResult, relative_tolerance: float = 1e-11) -> li
         for r in np.flatnonzero(near[:, k]):
             row = study.system.output_index(responses[r])
             value = larger_side(float(run.mean[row]), float(np.sqrt(run.variance[row].sum())))
-            found.append(Verification(responses[r], problem.times[k], float(largest[r, k]), float(value)))
+            found.append(RecomputedPeak(responses[r], problem.times[k], float(largest[r, k]), float(value)))
     return found
 
 
@@ -312,3 +313,14 @@ def _infeasible(search: Search, u: NDArray[np.float64]) -> InfeasibleDesignError
     assert quantity.limit is not None
     at = f"{quantity.name} [{quantity.unit}] at {quantity.time_after:g} s"
     return InfeasibleDesignError(at, quantity.limit, quantity.after, _values(search.problem, u))
+
+
+_SUCCESSORS = {"verify_design": recompute_peaks, "Verification": RecomputedPeak}
+
+
+def __getattr__(name: str) -> object:
+    if name not in _SUCCESSORS:
+        raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
+    successor = _SUCCESSORS[name]
+    warn_deprecated(f"{__name__}.{name}", f"{__name__}.{successor.__name__}")
+    return successor

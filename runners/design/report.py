@@ -12,11 +12,11 @@ from rich.table import Table
 
 from ..present.files import write_whole
 from ..present.style import display, words, write_figure
-from .design import DesignResult, TradePoint, Verification
-from .figures import trade_figure
+from .design import DesignResult, RecomputedPeak, TradePoint
+from .trade_figure import trade_figure
 
 
-def print_design(result: DesignResult, verified: Sequence[Verification], console: Console) -> None:
+def print_design(result: DesignResult, again: Sequence[RecomputedPeak], console: Console) -> None:
     """Print parameters, peaks and dampings before and after, what holds the design, and the verdict."""
     table = Table("parameter", title=f"Design of {result.problem.study.system.name}")
     for column in ("before", "after", "between"):
@@ -41,22 +41,22 @@ def print_design(result: DesignResult, verified: Sequence[Verification], console
     console.print(table)
     for name, multiplier in result.stationarity.multipliers:
         console.print(f"active: {name}, multiplier {multiplier:.3g}", soft_wrap=True, highlight=False)
-    console.print(verdict(result, verified), style="green" if good(result, verified) else "bold red", soft_wrap=True)
+    console.print(verdict(result, again), style="green" if good(result, again) else "bold red", soft_wrap=True)
 
 
-def good(result: DesignResult, verified: Sequence[Verification]) -> bool:
+def good(result: DesignResult, again: Sequence[RecomputedPeak]) -> bool:
     """Return whether a design converged and CVODES agrees."""
-    return result.converged and all(v.agrees for v in verified)
+    return result.converged and all(v.agrees for v in again)
 
 
-def verdict(result: DesignResult, verified: Sequence[Verification]) -> str:
-    """Return stationarity, run time and verification in a sentence."""
+def verdict(result: DesignResult, again: Sequence[RecomputedPeak]) -> str:
+    """Return stationarity, run time and what CVODES says in a sentence."""
     state = "stationary point" if result.converged else "no stationary point was reached"
-    worst = max((v.difference for v in verified), default=0.0)
+    worst = max((v.difference for v in again), default=0.0)
     return (
         f"{state}: residual {result.stationarity.residual:.1e}, violation {result.stationarity.violation:.1e}; "
         f"{result.evaluations} flights and {result.gradients} gradients in {result.seconds:.1f} s; "
-        f"CVODES differs by {worst:.1e} at most at {len(verified)} peaks"
+        f"CVODES differs by {worst:.1e} at most at {len(again)} peaks"
     )
 
 

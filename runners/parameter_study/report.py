@@ -15,7 +15,8 @@ from ..present.files import write_bytes
 from ..present.style import write_figure
 from .changes import changes
 from .compute import STATUS
-from .figures import band_figure, grid_figure, histogram_figure, tornado_figure
+from .dispersion_figures import band_figure, histogram_figure, tornado_figure
+from .grid_figure import grid_figure
 from .measures import PEAK, measures
 from .printout import print_changes, print_grid, print_reasons, print_spread
 from .run import ParameterStudy

@@ -41,6 +41,7 @@ STYLE: dict[Any, Any] = {
     "svg.hashsalt": "ascentwind",
 }
 COLORS = {"mean": "#444444", "wind": "#1f6fb4", COMBINED: "#c8442c"}
+SHADES = ("#1f6fb4", "#c8442c", "#3a8f4d", "#8e5bb5", "#c98a1b", "#444444")  # of curves that stand for no source
 
 
 def display(unit: str, values: ArrayLike) -> tuple[float, str]:

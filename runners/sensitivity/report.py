@@ -13,7 +13,7 @@ from rich.table import Table
 from ..present.files import write_whole
 from ..present.netcdf import write_netcdf
 from ..present.style import write_figure
-from .figures import altitude_figure, heading, largest, time_figure, tornado_figure
+from .derivative_figures import altitude_figure, heading, largest, time_figure, tornado_figure
 from .layout import stored_layout
 
 SHOWN = 15

@@ -153,7 +153,7 @@ class ResponseStatistics:
         ParameterValueError
             Of a batch, or without all sources.
         """
-        from .figures import response_figure
+        from .response_figures import response_figure
 
         table = ResponseStatistics(self._one_table()).sel(response=[response])
         return response_figure(

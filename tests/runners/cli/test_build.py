@@ -11,7 +11,7 @@ import xarray as xr
 
 from ascentwind.model.vehicle.shipped import built_in_vehicles
 from ascentwind.runners.cli.app import main
-from ascentwind.runners.construct.figures import FIGURES
+from ascentwind.runners.construct.vehicle_figures import FIGURES
 from ascentwind.runners.views.along_vehicle_files import COLUMNS, NAME
 
 

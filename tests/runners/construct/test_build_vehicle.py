@@ -15,7 +15,7 @@ from ascentwind.model.files.csv_table import read_csv_table
 from ascentwind.model.vehicle.shipped import built_in_vehicles
 from ascentwind.model.vehicle.vehicle_file import read_vehicle_file
 from ascentwind.runners.construct.build_vehicle import build_vehicle, inputs_hash, table_entries
-from ascentwind.runners.construct.figures import FIGURES
+from ascentwind.runners.construct.vehicle_figures import FIGURES
 from ascentwind.runners.construct.vehicle_numbers import STEPS
 
 AS504 = built_in_vehicles()["as504"]

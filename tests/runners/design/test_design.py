@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import warnings
+
 import casadi as ca
 import numpy as np
 import pytest
 from scipy.optimize import root_scalar
 
 from ascentwind.model import define_system
-from ascentwind.model.errors import ParameterValueError, TimeRangeError, UnknownNameError
+from ascentwind.model.deprecation import warn_deprecated
+from ascentwind.model.errors import DeprecatedNameWarning, ParameterValueError, TimeRangeError, UnknownNameError
 from ascentwind.runners import Study
-from ascentwind.runners.design.design import InfeasibleDesignError, design, trade, verify_design
+from ascentwind.runners.design import design as designs
+from ascentwind.runners.design.design import InfeasibleDesignError, RecomputedPeak, design, recompute_peaks, trade
 from ascentwind.runners.design.peaks import gradients, three_sigma
 from ascentwind.runners.design.problem import DesignProblemError, LoadReliefProblem
 from ascentwind.runners.solvers.frozen_roots import FrozenRoots
@@ -203,12 +207,12 @@ def test_multiplier_is_what_a_looser_limit_gains(lag):
 
 @pytest.mark.slow
 def test_cvodes_confirms_the_design(designed):
-    verified = verify_design(designed)
-    assert {v.response for v in verified} == {"bending_moment", "engine_angle"}
-    assert max(v.designed for v in verified if v.response == "bending_moment") == pytest.approx(
+    recomputed = recompute_peaks(designed)
+    assert {v.response for v in recomputed} == {"bending_moment", "engine_angle"}
+    assert max(v.designed for v in recomputed if v.response == "bending_moment") == pytest.approx(
         designed.peak, rel=1e-12
     )
-    for line in verified:
+    for line in recomputed:
         assert line.difference <= 1e-6
 
 
@@ -238,3 +242,19 @@ def test_problems_that_make_no_sense_are_refused(lag, changes, error, message):
     given = {"parameters": {"k": (0.5, 3.0)}, "times": LATE, "response": "load", **changes}
     with pytest.raises(error, match=message):
         LoadReliefProblem(lag, **given)
+
+
+@pytest.mark.parametrize(
+    ("old", "successor"), [("verify_design", recompute_peaks), ("Verification", RecomputedPeak)], ids=str
+)
+def test_an_old_name_is_its_successor_and_warns_once(old, successor):
+    warn_deprecated.cache_clear()
+    where = "ascentwind.runners.design.design"
+    with pytest.warns(DeprecatedNameWarning, match=rf"{where}.{old} goes .* use {where}.{successor.__name__}$"):
+        found = getattr(designs, old)
+    assert found is successor
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert getattr(designs, old) is found
+    with pytest.raises(AttributeError, match="no attribute 'verify_designs'"):
+        getattr(designs, "verify_designs")  # noqa: B009

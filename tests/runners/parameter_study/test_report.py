@@ -20,7 +20,8 @@ from scipy import stats
 
 from ascentwind.runners.parameter_study import run_parameter_study
 from ascentwind.runners.parameter_study.changes import changes
-from ascentwind.runners.parameter_study.figures import band_figure, grid_figure, histogram_figure, tornado_figure
+from ascentwind.runners.parameter_study.dispersion_figures import band_figure, histogram_figure, tornado_figure
+from ascentwind.runners.parameter_study.grid_figure import grid_figure
 from ascentwind.runners.parameter_study.measures import measures
 from ascentwind.runners.parameter_study.report import report
 from ascentwind.runners.parameter_study.spread import _moments, spread

@@ -7,8 +7,7 @@ from collections.abc import Mapping, Sequence
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
-from ..present.style import STYLE, display, words
-from ..sensitivity.figures import SHADES
+from ..present.style import SHADES, STYLE, display, words
 from .design import TradePoint
 
 

@@ -9,13 +9,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ...model.system.linear_system import COMBINED
-from ..present.style import COLORS, STYLE, display, words
+from ..present.style import COLORS, SHADES, STYLE, display, words
 from ..statistics.larger_side import LABEL, LARGER_SIDE, side
 
 BARS = 14
 CURVES = 6
 EARLIER = 30.0  # s before t2 that the curves show
-SHADES = ("#1f6fb4", "#c8442c", "#3a8f4d", "#8e5bb5", "#c98a1b", "#444444")
 LABELS = {LARGER_SIDE: LABEL, "std": "σ", "variance": "variance", "mean": "mean", "mean_plus_3sigma": "mean + 3σ"}
 
 
