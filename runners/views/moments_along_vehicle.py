@@ -7,7 +7,7 @@ source by source, their covariances P; then E[M] = K E[y] and Var[M] = diag(K P 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,10 +17,11 @@ from numpy.typing import NDArray
 from ...model.equations.load_components import component_columns
 from ...model.equations.noise_loads import noise_load
 from ...model.equations.station_loads import StationLoads, load_station_loads
-from ...model.errors import IntegrationError
+from ...model.errors import DataError, IntegrationError
 from ...model.system.linear_system import COMBINED
 from ...model.vehicle.columns import local_load_columns
 from ...model.vehicle.noise_loads import loading_noises
+from ...model.vehicle.vehicle import Vehicle
 from ..case.provenance import provenance
 from ..solvers.time_nodes import interval_before, time_nodes
 from ..statistics.dataset import QUANTITIES
@@ -28,6 +29,98 @@ from ..statistics.engine import Engine
 
 if TYPE_CHECKING:
     from ..study import Study
+
+SAME_STATION = 1e-6  # m
+
+
+@dataclass(frozen=True, eq=False)
+class LoadRows:
+    """Loads at stations as rows of the Markov state: load = state x + direct_mean, about which no white noise acts.
+
+    Attributes
+    ----------
+    time : (k,) array
+        s.
+    station, forward_of_gimbal : (s,) arrays
+        Vehicle station and metres forward of the gimbal plane (m).
+    state : (k, s, n) array
+        C, over the states of the study's own system.
+    direct_mean : (k, s) array
+        What the mean wind adds without delay: G u.
+    """
+
+    time: NDArray[np.float64]
+    station: NDArray[np.float64]
+    forward_of_gimbal: NDArray[np.float64]
+    state: NDArray[np.float64]
+    direct_mean: NDArray[np.float64]
+
+
+def load_rows(
+    study: Study,
+    times: Iterable[float],
+    stations: Iterable[float] | None = None,
+    *,
+    slosh_reaction: bool = True,
+) -> LoadRows:
+    """Return the bending moment at stations in terms of the states at each time; from the left where flight jumps.
+
+    Parameters
+    ----------
+    study : Study
+        Of a vehicle with ``tables.loads_along_vehicle``.
+    times : iterable of float
+        Increasing, s.
+    stations : iterable of float, optional
+        Vehicle stations (m), each among those of the table; all of them without it.
+    slosh_reaction : bool
+        As for :func:`moments_along_vehicle`.
+
+    Raises
+    ------
+    DataError, TimeRangeError, DirectNoiseError
+    """
+    vehicle = study.vehicle_for("the bending moment along the vehicle")
+    at = np.array(study.checked_times(times), float)
+    loads = load_station_loads(vehicle)
+    chosen = np.arange(loads.station.size) if stations is None else _chosen(loads, stations, vehicle)
+    names = list(
+        component_columns(len(vehicle.bending), [tank.name for tank in vehicle.slosh], loading_noises(vehicle.file))
+    )
+    components = _with_components(study)
+    components.system.refuse_direct_noise(names)
+    rows = station_rows(study, loads, at, slosh_reaction)[:, chosen]
+    outputs = [components.system.output_index(name) for name in names]
+    executable = components.executable.with_numbers(groups=study.with_means.groups)
+    nodes = time_nodes(executable, at)
+    sides = [interval_before(executable, float(node)) for node in nodes]
+    matrices = [executable.matrices(node, here.low, here.high) for node, here in zip(nodes, sides, strict=True)]
+    state = np.array([m["C"][outputs] for m in matrices])
+    direct = np.array([(m["G"] @ m["inputs"])[outputs, 0] for m in matrices])
+    return LoadRows(
+        at,
+        loads.station[chosen],
+        loads.forward_of_gimbal[chosen],
+        np.einsum("tsc,tcn->tsn", rows, state),
+        np.einsum("tsc,tc->ts", rows, direct),
+    )
+
+
+def _chosen(loads: StationLoads, stations: Iterable[float], vehicle: Vehicle) -> NDArray[np.intp]:
+    """Return which of the table's stations are wanted."""
+    wanted = np.array(list(stations), float)
+    nearest = np.abs(loads.station - wanted[:, None]).argmin(axis=1)
+    off = ~(np.abs(loads.station[nearest] - wanted) <= SAME_STATION)
+    if off.any():
+        k = int(np.argmax(off))
+        entry = vehicle.file.tables.loads_along_vehicle
+        raise DataError(
+            f"has no station at {wanted[k]:g} m; the nearest is {loads.station[nearest[k]]:.9g} m. Choose among its "
+            "stations, or build the vehicle with a load there",
+            file=vehicle.folder / entry.file if entry else None,
+            column="station",
+        )
+    return nearest
 
 
 def moments_along_vehicle(

@@ -14,9 +14,10 @@ from ascentwind.model.files.csv_table import read_csv_table
 from ascentwind.model.vehicle.columns import REACTION, along_columns, local_columns, local_load_columns
 from ascentwind.model.vehicle.shipped import built_in_vehicles
 from ascentwind.runners import Study
+from ascentwind.runners.solvers.time_nodes import interval_before
 from ascentwind.runners.statistics.covariance import CovarianceEquation
 from ascentwind.runners.statistics.sweep import Sweep
-from ascentwind.runners.views.moments_along_vehicle import moments_along_vehicle
+from ascentwind.runners.views.moments_along_vehicle import load_rows, moments_along_vehicle
 
 ALONG = "loads_along_vehicle.csv"
 AS504 = built_in_vehicles()["as504"]
@@ -99,6 +100,24 @@ def test_every_station_is_the_moment_that_is_an_output_there(folder, options, no
         np.testing.assert_allclose(along[quantity].values, expected, rtol=1e-9)
     np.testing.assert_allclose(along["mean"].values, direct.mean.sel(source="combined").values, rtol=1e-9)
     assert along["station"].values.tolist() == [25.0, 60.0]
+
+
+@pytest.mark.parametrize("options", [(), ("slosh_reaction", "local_angle_of_attack")])
+def test_rows_are_those_of_the_moment_that_is_an_output_there(folder, options):
+    """Coefficient by coefficient, from the left where the flight jumps: C and G u of the outputs."""
+    study = Study.load(folder, compile=False, changes={f"options.{name}": True for name in options})
+    times = [30.0, 70.0, 105.6]
+    found = load_rows(study, times, [60.0, 25.0], slosh_reaction="slosh_reaction" in options)
+    outputs = [study.system.output_index(name) for name in ("bending_moment_b", "bending_moment")]
+    assert found.station.tolist() == [60.0, 25.0]
+    for k, time in enumerate(times):
+        before = interval_before(study.executable, time)
+        at = study.with_means.matrices(time, before.low, before.high)
+        largest = np.abs(at["C"][outputs]).max(axis=0)
+        assert (np.abs(found.state[k] - at["C"][outputs]) <= 1e-10 * largest).all()
+        np.testing.assert_allclose(found.direct_mean[k], (at["G"] @ at["inputs"])[outputs, 0], rtol=1e-10)
+    with pytest.raises(DataError, match=r"loads_along_vehicle\.csv, column 'station': has no station at 26 m.*25 m"):
+        load_rows(study, times, [25.0, 26.0])
 
 
 def test_covariance_equation_gives_the_same_without_a_compiler(folder):
