@@ -46,7 +46,7 @@ def own(thing: Any) -> bool:
 
 
 def offered() -> Iterator[tuple[str, Any]]:
-    """Yield every public function, class and method behind the front door, methods of base classes of ours too."""
+    """Yield every public function, class and method behind the front door, methods of base classes of ours last."""
     for name in sorted(dir(aw)):
         thing = getattr(aw, name)
         if not callable(thing):
@@ -59,7 +59,7 @@ def offered() -> Iterator[tuple[str, Any]]:
                     yield f"{name}.{member}", value
 
 
-OFFERED = dict(offered())
+OFFERED = dict(reversed(list(offered())))  # a method that a class has itself stands for that of its base class
 
 
 def asked(thing: Any) -> dict[str, inspect.Parameter]:
@@ -71,7 +71,7 @@ def asked(thing: Any) -> dict[str, inspect.Parameter]:
 
 
 def faults(thing: Any) -> list[str]:
-    found, said = sections(thing.__doc__ or ""), []
+    found, said = sections(inspect.getdoc(thing) or ""), []  # a method without one has that of its base class
     if not found[""].strip():
         return ["it has no docstring"]
     parameters = asked(thing)

@@ -286,10 +286,8 @@ def check_covariance(where: str, states: Sequence[str], matrix: NDArray[np.float
 
     Parameters
     ----------
-    where : str
-        Of which system and source, for errors.
-    states : sequence of str
-        Names.
+    where, states
+        As for :func:`checked_covariance`.
     matrix : (n, n) array
 
     Raises

@@ -24,24 +24,11 @@ COUNTERS = ("nsteps", "nfevals", "nlinsetups", "netfails")
 
 @dataclass(frozen=True)
 class CvodesSettings:
-    """How CVODES integrates.
+    """How CVODES integrates; what each setting means is told where people give them, at :class:`ascentwind.Cvodes`.
 
-    Parameters
-    ----------
-    method : {'adams', 'bdf'}
-        Multistep formulas. Adams with Newton iteration is the default by measurement (docs/performance.md): the
-        spectrum holds lightly damped bending, which BDF damps, beside filter poles near 100 rad/s, which cost
-        functional iteration its step.
-    iteration : {'newton', 'functional'}
-    relative_tolerance : float
-        Relative, on every adjoint and quadrature, between 1e-13 and 1e-2.
-    absolute_part : float
-        The absolute tolerance as a part of the relative one, of quantities scaled to be of the order of one
-        (runners/solvers/typical_sizes.py).
-    max_steps : int
-        Of one run from end to start; AS-504 takes 20,000 at a tolerance of 1e-9.
-    longest_interval : float
-        Intervals between discontinuities are divided so that none is longer, s; the solver begins anew in each.
+    Raises
+    ------
+    IntegrationError
     """
 
     method: Method = "adams"

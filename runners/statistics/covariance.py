@@ -8,18 +8,19 @@ from typing import ClassVar
 import xarray as xr
 
 from ..case.case import Case
-from ..case.provenance import provenance
 from ..solvers.covariance import covariance_equation
 from ..solvers.tolerances import check_absolute_part, check_relative_tolerance
 from .dataset import statistics_dataset, with_covariance
-from .engine import Progress, begun_anew
+from .engine import Engine, Progress, begun_anew
 
 LEAST_TOLERANCE = 1e-13
 
 
 @dataclass(frozen=True)
-class CovarianceEquation:
+class CovarianceEquation(Engine):
     """The covariance equation, forward by SciPy's DOP853; nothing of it uses the adjoint.
+
+    Its statistics hold covariances between responses.
 
     Parameters
     ----------
@@ -51,46 +52,15 @@ class CovarianceEquation:
     def compute(
         self, case: Case, times: list[float], responses: list[str], progress: Progress | None = None
     ) -> xr.Dataset:
-        """Return the statistics, with covariances between responses.
-
-        Parameters
-        ----------
-        case : Case
-        times : list of float
-            End times, increasing, s.
-        responses : list of str
-        progress : callable, optional
-            Called with each end time (s) when it is done.
-
-        Returns
-        -------
-        xarray.Dataset
-            As :attr:`ascentwind.ResponseStatistics.dataset`.
-
-        Raises
-        ------
-        IntegrationError
-        """
         rows = [case.system.output_index(name) for name in responses]
         found = covariance_equation(
             case.with_means, times, self.relative_tolerance, progress, self.longest_interval, self.absolute_part
         )
-        attributes = provenance(case) | {"engine": self.name, "relative_tolerance": self.relative_tolerance}
+        attributes = {"engine": self.name, "relative_tolerance": self.relative_tolerance}
         dataset = statistics_dataset(case, times, responses, found.mean[:, rows], found.variance[:, rows], attributes)
         return with_covariance(dataset, found.covariance, rows)
 
     def finer(self, flight: float) -> CovarianceEquation:
-        """Return the equation begun anew in short pieces, see :func:`begun_anew`.
-
-        Parameters
-        ----------
-        flight : float
-            Its length, s.
-
-        Returns
-        -------
-        CovarianceEquation
-        """
         settings = begun_anew(self.relative_tolerance, self.absolute_part, self.longest_interval, flight)
         return replace(self, **settings)
 

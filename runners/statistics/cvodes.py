@@ -10,17 +10,18 @@ import numpy as np
 import xarray as xr
 
 from ..case.case import Case
-from ..case.provenance import provenance
 from ..solvers.adjoint import AdjointRun, AdjointSolver
 from ..solvers.integration import COUNTERS, CvodesSettings
 from ..solvers.time_nodes import time_nodes
 from .dataset import statistics_dataset
-from .engine import Progress, begun_anew
+from .engine import Engine, Progress, begun_anew
 
 
 @dataclass(frozen=True)
-class Cvodes(CvodesSettings):
+class Cvodes(CvodesSettings, Engine):
     """One backward adjoint run of CVODES an end time, the report's method.
+
+    Its statistics hold the work of the solver by end time.
 
     Parameters
     ----------
@@ -50,26 +51,6 @@ class Cvodes(CvodesSettings):
     def compute(
         self, case: Case, times: list[float], responses: list[str], progress: Progress | None = None
     ) -> xr.Dataset:
-        """Return the statistics, with the work of the solver by end time.
-
-        Parameters
-        ----------
-        case : Case
-        times : list of float
-            End times, increasing, s.
-        responses : list of str
-        progress : callable, optional
-            Called with each end time (s) when it is done.
-
-        Returns
-        -------
-        xarray.Dataset
-            As :attr:`ascentwind.ResponseStatistics.dataset`.
-
-        Raises
-        ------
-        IntegrationError, StepBudgetError
-        """
         solver = AdjointSolver(case.with_means, self)
         runs = []
         for time, node in zip(times, time_nodes(case.executable, times).tolist(), strict=True):
@@ -79,17 +60,6 @@ class Cvodes(CvodesSettings):
         return response_dataset(case, runs, responses, self)
 
     def finer(self, flight: float) -> Cvodes:
-        """Return the engine begun anew in short pieces, see :func:`begun_anew`.
-
-        Parameters
-        ----------
-        flight : float
-            Its length, s.
-
-        Returns
-        -------
-        Cvodes
-        """
         settings = begun_anew(self.relative_tolerance, self.absolute_part, self.longest_interval, flight)
         return replace(self, **settings)
 
@@ -106,7 +76,7 @@ def response_dataset(
     rows = [case.system.output_index(name) for name in responses]
     variance = np.array([run.variance[rows] for run in runs])
     mean = np.array([run.mean[rows] for run in runs])
-    attributes = provenance(case) | {
+    attributes = {
         "engine": "cvodes",
         "code": case.executable.engine,
         "method": options.method,

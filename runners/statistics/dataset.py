@@ -29,7 +29,7 @@ def statistics_dataset(
     responses: Sequence[str],
     mean: np.ndarray,
     variance: np.ndarray,
-    attributes: dict[str, object],
+    attributes: Mapping[str, object],
 ) -> xr.Dataset:
     """Return the dataset of statistics.
 
@@ -38,6 +38,8 @@ def statistics_dataset(
     mean : (k, responses) or (members, k, responses) array
     variance : (k, responses, sources) or (members, k, responses, sources) array
         The combined variance is added here.
+    attributes : mapping
+        What the engine says of itself; :func:`provenance` is added.
     """
     system = case.system
     variance = np.concatenate([variance, variance.sum(axis=-1, keepdims=True)], axis=-1)
@@ -58,7 +60,7 @@ def statistics_dataset(
             "source": [*system.sources, COMBINED],
             "unit": ("response", units),
         },
-        attributes,
+        provenance(case) | attributes,
     )
     for name, meaning in QUANTITIES.items():
         dataset[name].attrs |= {RULE: "response^2" if name == "variance" else "response", "long_name": meaning}
@@ -107,6 +109,6 @@ def batch_dataset(
 
     ``members`` are means (k, responses) and variances (k, responses, sources).
     """
-    attributes = provenance(case) | {"engine": engine, "relative_tolerance": relative_tolerance}
+    attributes = {"engine": engine, "relative_tolerance": relative_tolerance}
     mean, variance = (np.array(values) for values in zip(*members, strict=True))
     return statistics_dataset(case, times, list(case.system.output_names), mean, variance, attributes)

@@ -33,11 +33,42 @@ class Engine(Protocol):
     def compute(
         self, case: Case, times: list[float], responses: list[str], progress: Progress | None = None
     ) -> xr.Dataset:
-        """Return the statistics of responses at increasing end times (s); ``progress`` hears each when it is done."""
+        """Return the statistics of responses at end times.
+
+        Parameters
+        ----------
+        case : Case
+        times : list of float
+            End times, increasing, s.
+        responses : list of str
+        progress : callable, optional
+            Called with each end time (s) when it is done.
+
+        Returns
+        -------
+        xarray.Dataset
+            As :attr:`ascentwind.ResponseStatistics.dataset`.
+
+        Raises
+        ------
+        IntegrationError, DirectNoiseError
+        NoCompilerError, CompilerError
+            By engines that exist as compiled code only.
+        """
         ...
 
     def finer(self, flight: float) -> Engine:
-        """Return the engine with a finer discretisation of a flight (s), by which the error of this one is judged."""
+        """Return the engine with a finer discretisation of a flight, by which the error of this one is judged.
+
+        Parameters
+        ----------
+        flight : float
+            Its length, s.
+
+        Returns
+        -------
+        Engine
+        """
         ...
 
     @classmethod

@@ -10,12 +10,11 @@ import xarray as xr
 
 from ...model.errors import AscentwindError
 from ..case.case import Case
-from ..case.provenance import provenance
 from ..present.netcdf import RULE
 from ..solvers.cores import available_cores
 from ..solvers.ensemble import mean_interval, run_ensemble, std_interval
 from .dataset import statistics_dataset
-from .engine import Progress, piece_of
+from .engine import Engine, Progress, piece_of
 
 FEWEST_RUNS = 10
 
@@ -25,8 +24,11 @@ class EnsembleOptionsError(AscentwindError):
 
 
 @dataclass(frozen=True)
-class Ensemble:
+class Ensemble(Engine):
     """Flights through random wind, the report's conventional method; needs a compiler.
+
+    Its statistics hold confidence intervals and the sample paths that are kept. A check takes half the substep, or less
+    where that is longer than the pieces of the flight that it looks at.
 
     Parameters
     ----------
@@ -81,43 +83,12 @@ class Ensemble:
     def compute(
         self, case: Case, times: list[float], responses: list[str], progress: Progress | None = None
     ) -> xr.Dataset:
-        """Return the statistics with their confidence intervals and the sample paths that are kept.
-
-        Parameters
-        ----------
-        case : Case
-        times : list of float
-            End times, increasing, s.
-        responses : list of str
-        progress : callable, optional
-            Called with each end time (s) when it is done.
-
-        Returns
-        -------
-        xarray.Dataset
-            As :attr:`ascentwind.ResponseStatistics.dataset`.
-
-        Raises
-        ------
-        EnsembleNeedsCompilerError, CompilerError, IntegrationError
-        """
         found = ensemble_dataset(case, times, responses, self)
         if progress:
             progress(times[-1])
         return found
 
     def finer(self, flight: float) -> Ensemble:
-        """Return half the substep, or less where that is longer than a piece of the flight that a check looks at.
-
-        Parameters
-        ----------
-        flight : float
-            Its length, s.
-
-        Returns
-        -------
-        Ensemble
-        """
         return replace(self, substep=piece_of(flight, 0.5 * self.substep) if flight > 0 else self.substep)
 
     @classmethod
@@ -138,7 +109,7 @@ def ensemble_dataset(case: Case, times: list[float], responses: list[str], flown
         path_spacing=flown.path_spacing, threads=flown.threads,
     )  # fmt: skip
     variance = found.variance[:, rows]
-    attributes = provenance(case) | {
+    attributes = {
         "engine": "ensemble", "runs": flown.runs, "seed": flown.seed, "confidence": flown.confidence,
         "substep_s": flown.substep,
     }  # fmt: skip

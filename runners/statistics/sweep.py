@@ -11,16 +11,18 @@ import xarray as xr
 from ...codegen.sweep.compiled import sweep_of
 from ...model.system.linear_system import COMBINED
 from ..case.case import Case
-from ..case.provenance import provenance
 from ..solvers.sweep import LEAST_TOLERANCE, LONGEST_SEGMENT, SweepResult, sweep
 from ..solvers.tolerances import check_relative_tolerance
 from .dataset import statistics_dataset, with_covariance
-from .engine import Progress, piece_of
+from .engine import Engine, Progress, piece_of
 
 
 @dataclass(frozen=True)
-class Sweep:
+class Sweep(Engine):
     """All end times in one pass of a generated integrator; needs a compiler.
+
+    Its statistics hold covariances between responses and the error estimate of the formulas. A check takes a tenth of
+    the tolerance, in pieces so short that no step passes over what the first pass missed.
 
     Parameters
     ----------
@@ -46,26 +48,6 @@ class Sweep:
     def compute(
         self, case: Case, times: list[float], responses: list[str], progress: Progress | None = None
     ) -> xr.Dataset:
-        """Return the statistics, with covariances between responses and the error estimate of the formulas.
-
-        Parameters
-        ----------
-        case : Case
-        times : list of float
-            End times, increasing, s.
-        responses : list of str
-        progress : callable, optional
-            Called with each end time (s) when it is done.
-
-        Returns
-        -------
-        xarray.Dataset
-            As :attr:`ascentwind.ResponseStatistics.dataset`.
-
-        Raises
-        ------
-        NoCompilerError, DirectNoiseError, IntegrationError
-        """
         found = sweep(
             sweep_of(case.executable),
             case.with_means,
@@ -80,17 +62,6 @@ class Sweep:
         return sweep_dataset(case, found, responses, self.relative_tolerance)
 
     def finer(self, flight: float) -> Sweep:
-        """Return a tenth of the tolerance, in pieces so short that no step passes over what the first pass missed.
-
-        Parameters
-        ----------
-        flight : float
-            Its length, s.
-
-        Returns
-        -------
-        Sweep
-        """
         tolerance = max(LEAST_TOLERANCE, 0.1 * self.relative_tolerance)
         return replace(self, relative_tolerance=tolerance, longest_interval=piece_of(flight, self.longest_interval))
 
@@ -103,7 +74,7 @@ class Sweep:
 def sweep_dataset(case: Case, found: SweepResult, responses: list[str], relative_tolerance: float) -> xr.Dataset:
     """Return the dataset of a sweep: statistics, covariances between responses, and the error estimate."""
     rows = [case.system.output_index(name) for name in responses]
-    attributes = provenance(case) | {
+    attributes = {
         "engine": "sweep",
         "relative_tolerance": relative_tolerance,
         **{f"sweep_{name}": value for name, value in found.counters.items()},

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import casadi as ca
 
-from ...model.equations.latex_symbols import latex_symbol
 from ...model.equations.report_equations import ReportEquation, report_equations
+from ...model.equations.report_symbols import latex_symbol
 from ...model.errors import AscentwindError, UnknownNameError
 from ..study import Study
 
