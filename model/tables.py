@@ -24,7 +24,7 @@ Kind = Literal["given", "mean"]  # of a group of tables
 INTERPOLATIONS = ("cubic", "pchip", "linear", "step")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Table:
     """One quantity over one argument.
 
@@ -47,6 +47,10 @@ class Table:
     values: NDArray[np.float64]
     interpolation: str = "cubic"
     breaks: tuple[float, ...] = ()
+
+    def __repr__(self) -> str:
+        first, *_, last = self.argument
+        return f"Table '{self.name}' [{self.unit}]: {self.argument.size} rows, {first:g} to {last:g}"
 
     def __post_init__(self):
         x, y = np.asarray(self.argument, float), np.asarray(self.values, float)

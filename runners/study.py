@@ -11,7 +11,7 @@ import xarray as xr
 
 from ..codegen.sweep.compiled import sweep_of
 from ..model.errors import IntegrationError, ParameterValueError
-from ..model.system.linear_system import COMBINED
+from ..model.system.names import COMBINED
 from .case.case import Case
 from .case.times import end_times
 from .sensitivity.check import check_sensitivity

@@ -19,7 +19,7 @@ from .source import c_source, source_fingerprint
 AGREEMENT = 1e-12  # between compiled and interpreted functions, of the largest entry
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ExecutableSystem:
     """A linear system with numbers, ready to be evaluated and integrated.
 
@@ -51,6 +51,9 @@ class ExecutableSystem:
     def tables(self) -> NDArray[np.float64]:
         """The run-time vector that compiled code reads by address; lives as long as this object."""
         return run_time_vector(self.groups) if self.groups else np.zeros(1)
+
+    def __repr__(self) -> str:
+        return f"ExecutableSystem ({self.engine}) of {self.system!r}"
 
     def stops(self, until: float) -> Stops:
         """Return where integrators stop up to ``until`` (s) for the parameters in force."""

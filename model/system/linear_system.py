@@ -27,12 +27,11 @@ from .checks import (
     checked_covariance,
 )
 from .labels import Noise, Output, Parameter, State, block_of
-from .names import COMBINED as COMBINED
 from .switches import switch_times
 from .time_conditions import Condition, Stops, find_conditions, locate
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class LinearSystem:
     """A linear time-varying system, symbolically.
 
@@ -98,6 +97,19 @@ class LinearSystem:
     end: float = float("inf")
     coupling_matrix: ca.SX | None = None
     structure: Mapping[str, str] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        counts = {
+            "state": self.states,
+            "output": self.outputs,
+            "noise": self.noises,
+            "source": self.sources,
+            "input": self.input_names,
+            "parameter": self.parameters,
+            "table": [name for group in self.tables for name in group.names],
+        }
+        told = ", ".join(f"{len(x)} {what}{'' if len(x) == 1 else 's'}" for what, x in counts.items())
+        return f"LinearSystem '{self.name}': {told}, {self.start:g} to {self.end:g} s"
 
     def __post_init__(self):
         where = f"system '{self.name}'"

@@ -28,7 +28,7 @@ class TableSource:
     last: float
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Vehicle:
     """Everything the equations need to know about a vehicle.
 
@@ -59,6 +59,13 @@ class Vehicle:
     end: float
     discontinuities: tuple[float, ...]
     sources: tuple[TableSource, ...]
+
+    def __repr__(self) -> str:
+        parts = f"{len(self.bending)} bending modes, {len(self.slosh)} slosh masses, {len(self.noise)} noises"
+        return (
+            f"Vehicle '{self.name}' ({self.title}): {parts}, {len(self.tables)} tables of {len(self.sources)} files in "
+            f"{self.folder}, {self.start:g} to {self.end:g} s"
+        )
 
     @property
     def start_altitude(self) -> float:

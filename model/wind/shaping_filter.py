@@ -22,7 +22,7 @@ from .record import WindOrigin
 _SQRT3 = np.sqrt(3.0)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ShapingFilter:
     """A time-varying linear filter over altitude.
 
@@ -61,6 +61,11 @@ class ShapingFilter:
     kinks: tuple[float, ...] = ()
     source: str = ""
     origin: WindOrigin | None = None
+
+    def __repr__(self) -> str:
+        states, noises = self.G.shape[1:]
+        span = f"{self.altitude[0]:g} to {self.altitude[-1]:g} m"
+        return f"ShapingFilter '{self.name}': {states} states, {noises} noises, {self.altitude.size} altitudes, {span}"
 
     def __post_init__(self):
         if self.altitude.ndim != 1 or self.start_covariance.ndim != 2 or not self.start_covariance.size:

@@ -80,7 +80,7 @@ def closed_form_filter(kernel: TwoPartKernel, standard_deviation: Table, top: fl
     return kernel.shaping_filter(altitude, sigma, kinks=[x for x in knots if low < x < high])
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class WindStatistics:
     """What is known about one component of the wind at a set of altitudes.
 
@@ -113,6 +113,10 @@ class WindStatistics:
     independent_samples: float = REPORT_SAMPLES
     source: str = ""
     origin: WindOrigin | None = None
+
+    def __repr__(self) -> str:
+        span = f"{self.altitude[0]:g} to {self.altitude[-1]:g} m"
+        return f"WindStatistics '{self.name}': {self.altitude.size} altitudes, {span}"
 
     def __post_init__(self):
         for label in ("altitude", "mean", "standard_deviation", "correlation"):

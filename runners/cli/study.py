@@ -29,8 +29,7 @@ def study(
 
     plan = read_plan(file)
     folder = out or Path(f"{file.stem}-results")
-    assert plan.vehicle is not None  # read_plan asks it of a file
-    loaded = load_study(plan.vehicle)
+    loaded = load_study(plan.named_vehicle())
     started = False
     try:
         with steps("members") as bar:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ...codegen.nodes.compiled import node_functions_of
 from ...model.errors import IntegrationError, UnstableSystemWarning
-from ...model.system.linear_system import COMBINED
+from ...model.system.names import COMBINED
 from ..sensitivity.gradient import gradient_of
 from ..sensitivity.pair import AdjointPair
 from ..solvers.flight_nodes import FlightNodes

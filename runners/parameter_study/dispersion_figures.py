@@ -8,7 +8,7 @@ from matplotlib import rc_context
 from matplotlib.figure import Figure
 from scipy import stats
 
-from ...model.system.linear_system import COMBINED
+from ...model.system.names import COMBINED
 from ..present.style import COLORS, STYLE, words, wrapped
 from ..statistics.larger_side import LABEL, LARGER_SIDE, larger_side
 from .compute import COMPUTED, STATUS

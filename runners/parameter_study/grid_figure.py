@@ -7,7 +7,7 @@ import xarray as xr
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
-from ...model.system.linear_system import COMBINED
+from ...model.system.names import COMBINED
 from ..present.style import COLORS, STYLE, words, wrapped
 from ..statistics.larger_side import LABEL
 from .compute import COMPUTED, FAILED, STATUS, UNSTABLE

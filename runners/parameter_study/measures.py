@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from ...model.system.linear_system import COMBINED
+from ...model.system.names import COMBINED
 from ..present.style import display
 from ..statistics.larger_side import LABEL, LARGER_SIDE, larger_side, side
 from .run import ParameterStudy

@@ -193,6 +193,18 @@ class ParameterStudyPlan(Section):
             raise ValueError(f"has two quantities named '{repeated[0]}'; rename one")
         return self
 
+    def named_vehicle(self) -> str:
+        """Return the vehicle that the plan names.
+
+        Raises
+        ------
+        DataError
+            It names none.
+        """
+        if self.vehicle is None:
+            raise DataError("is missing; name a shipped vehicle or a vehicle folder, or give a study", column="vehicle")
+        return self.vehicle
+
     @property
     def kind(self) -> Kind:
         """Which of the three tables the plan has."""

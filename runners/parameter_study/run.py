@@ -13,7 +13,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ...model.errors import DataError, OutputFolderError, ParameterValueError, UnknownNameError
-from ...model.system.linear_system import COMBINED
+from ...model.system.names import COMBINED
 from ..case.provenance import provenance
 from ..case.times import parse_times
 from ..present.files import write_bytes
@@ -103,9 +103,7 @@ def run_parameter_study(
     file = Path(plan) if isinstance(plan, str | Path) else None
     plan = read_plan(plan)
     if study is None:
-        if plan.vehicle is None:
-            raise DataError("is missing; name a shipped vehicle or a vehicle folder, or give a study", column="vehicle")
-        study = Study.load(plan.vehicle)
+        study = Study.load(plan.named_vehicle())
     try:
         quantities = resolve_quantities(study, plan)
         values = member_values(plan, quantities)

@@ -36,7 +36,7 @@ def unit_factors(text: str) -> dict[str, float]:
 
 
 def written_unit(factors: Mapping[str, float]) -> str:
-    """Return a unit as UDUNITS and pint both read it: 'N m', 'm s^-2', '1'."""
+    """Return a unit as UDUNITS and pint both read it: 'N m', 'm s^-2'; pint alone reads 's^-0.5'."""
     parts = []
     for name, power in factors.items():
         if power:

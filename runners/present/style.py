@@ -14,8 +14,7 @@ from matplotlib.text import Text
 from matplotlib.ticker import FixedFormatter, FuncFormatter
 from numpy.typing import ArrayLike
 
-from ...model.system.linear_system import COMBINED
-from ...model.system.names import file_name
+from ...model.system.names import COMBINED, file_name
 from .files import write_whole
 
 # what people read: factor from SI, unit

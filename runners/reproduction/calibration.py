@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq, least_squares
 
-from ...model.system.linear_system import COMBINED
+from ...model.system.names import COMBINED
 from ...model.vehicle.shipped import find_vehicle
 from ...model.wind.range_reference import shipped_statistics
 from ...model.wind.statistics import WindStatistics

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ...model.errors import DirectNoiseError
-from ...model.system.linear_system import COMBINED
+from ...model.system.names import COMBINED
 from ...model.vehicle.reader import VEHICLE_FILE
 from ...model.vehicle.shipped import find_vehicle
 from ...model.vehicle.vehicle_file import read_vehicle_file

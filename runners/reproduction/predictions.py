@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from ...model.errors import DataError
-from ...model.system.linear_system import COMBINED
+from ...model.system.names import COMBINED
 from ...model.wind.range_reference import shipped_statistics
 from ..case.times import parse_times
 from ..solvers.stability import roots

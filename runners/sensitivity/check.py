@@ -17,8 +17,7 @@ import xarray as xr
 from ...codegen.system.executable import ExecutableSystem
 from ...model.equations.vehicle_tables import vehicle_tables
 from ...model.errors import ParameterValueError
-from ...model.system.linear_system import COMBINED
-from ...model.system.names import WIND
+from ...model.system.names import COMBINED, WIND
 from ...model.vehicle.vehicle import Vehicle
 from ...model.wind.shaping_filter import ShapingFilter
 from ..case.wind_start import covariance_at

@@ -8,7 +8,7 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ...model.system.linear_system import COMBINED
+from ...model.system.names import COMBINED
 from ..present.style import COLORS, SHADES, STYLE, display, words
 from ..statistics.larger_side import LABEL, LARGER_SIDE, side
 

@@ -10,7 +10,8 @@ import numpy as np
 import xarray as xr
 
 from ...model.errors import AscentwindWarning, SwitchError
-from ...model.system.linear_system import COMBINED, LinearSystem
+from ...model.system.linear_system import LinearSystem
+from ...model.system.names import COMBINED
 from ..case.provenance import provenance
 from ..present.netcdf import RULE
 from ..solvers.stability import warn_if_unstable

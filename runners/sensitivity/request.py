@@ -9,7 +9,7 @@ import numpy as np
 
 from ...codegen.nodes.compiled import node_functions_of
 from ...model.errors import AscentwindError, UnknownNameError
-from ...model.system.linear_system import COMBINED
+from ...model.system.names import COMBINED
 from ...model.vehicle.structural_keys import structural_keys
 from ..case.case import Case
 from ..solvers.flight_nodes import FlightNodes

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import xarray as xr
 
-from ...model.system.linear_system import COMBINED
+from ...model.system.names import COMBINED
 from ..case.provenance import provenance
 from ..present.netcdf import RULE, unit_factors, written_unit
 

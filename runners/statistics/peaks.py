@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from ...model.system.linear_system import COMBINED
+from ...model.system.names import COMBINED
 from .larger_side import larger_side, side
 
 

@@ -9,7 +9,7 @@ import xarray as xr
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
-from ...model.system.linear_system import COMBINED
+from ...model.system.names import COMBINED
 from ..present.style import COLORS, STYLE, display, words, wrapped
 from .larger_side import LABEL, SIGMAS, sign
 from .peaks import peaks

@@ -12,7 +12,7 @@ import xarray as xr
 
 from ...model.deprecation import warn_deprecated
 from ...model.errors import ParameterValueError, UnknownNameError
-from ...model.system.linear_system import COMBINED
+from ...model.system.names import COMBINED
 from ..present.files import prepare_folder
 from ..present.notebook import html_page, shortened
 from .dataset import QUANTITIES

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from ...codegen.sweep.compiled import sweep_of
-from ...model.system.linear_system import COMBINED
+from ...model.system.names import COMBINED
 from ..case.case import Case
 from ..solvers.sweep import LEAST_TOLERANCE, LONGEST_SEGMENT, SweepResult, sweep
 from ..solvers.tolerances import check_relative_tolerance

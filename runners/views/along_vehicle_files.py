@@ -17,7 +17,7 @@ from ...model.construction.construction_file import CONSTRUCTION_FILE, load_cons
 from ...model.construction.tank_shape import TankShape
 from ...model.equations.station_loads import load_station_loads
 from ...model.errors import TimeRangeError
-from ...model.system.linear_system import COMBINED
+from ...model.system.names import COMBINED
 from ...model.vehicle.vehicle import Vehicle
 from ..present.files import write_whole
 from ..present.netcdf import write_netcdf

@@ -18,7 +18,7 @@ from ...model.equations.load_components import component_columns
 from ...model.equations.noise_loads import noise_load
 from ...model.equations.station_loads import StationLoads, load_station_loads
 from ...model.errors import DataError, IntegrationError
-from ...model.system.linear_system import COMBINED
+from ...model.system.names import COMBINED
 from ...model.vehicle.columns import local_load_columns
 from ...model.vehicle.noise_loads import loading_noises
 from ...model.vehicle.vehicle import Vehicle

@@ -7,7 +7,7 @@ serves the vehicle gives its weighting functions g(h2, h).
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import casadi as ca
 import numpy as np
@@ -53,7 +53,7 @@ class Verification:
     """
 
     statistics: WindStatistics
-    covariance: NDArray[np.float64]
+    covariance: NDArray[np.float64] = field(repr=False)
     share_inside: float
     rms_error: float
     largest_pole: float

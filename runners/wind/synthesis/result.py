@@ -43,12 +43,12 @@ class SynthesisResult:
     method: str
     statistics: WindStatistics
     shaping_filter: ShapingFilter
-    covariance: NDArray[np.float64]
+    covariance: NDArray[np.float64] = field(repr=False)
     converged: bool
     message: str = ""
     evaluations: int = 0
     seconds: float = 0.0
-    coefficients: Mapping[str, tuple[NDArray, NDArray]] = field(default_factory=dict)
+    coefficients: Mapping[str, tuple[NDArray, NDArray]] = field(default_factory=dict, repr=False)
 
     @property
     def error(self) -> NDArray[np.float64]:

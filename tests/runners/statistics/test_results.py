@@ -15,6 +15,7 @@ from ascentwind.model.errors import (
     ParameterValueError,
     UnknownNameError,
 )
+from ascentwind.model.wind.range_reference import shipped_statistics
 from ascentwind.runners.sensitivity.layout import stored_layout
 from ascentwind.runners.statistics.peak_check import check_peaks, with_peak_check
 from ascentwind.runners.statistics.results import ResponseStatistics
@@ -211,6 +212,12 @@ def test_what_is_printed_fits_a_screen(as504, statistics, cache):
         assert len(text) < 2500
         assert len(text.splitlines()) <= 24
         assert len(page) < 20_000
+    parts = (as504.system, as504.executable, as504.vehicle, as504.vehicle.wind, as504.vehicle.wind.shaping_filter)
+    for part in (*parts, shipped_statistics(), lag().system):
+        assert len(repr(part)) < 2500
+        assert len(repr(part).splitlines()) <= 24
+    assert repr(as504.system).startswith(f"LinearSystem 'as504': {len(as504.system.states)} states, ")
+    assert as504.vehicle.title in repr(as504.vehicle)
     assert "as504" in repr(as504)
     assert "bending_moment [N m]" in repr(as504)
     assert "reference_area = 80" in repr(as504.with_parameters({"reference_area": 80.0}))

@@ -40,7 +40,7 @@ def test_a_batch_is_computed_by_cvodes(interpreted):
     assert found.attrs["engine"] == "cvodes"
     mean, std = closed_form(np.array([2.0, 3.0]))
     for member, factor in enumerate((1, 2)):
-        part = found.sel(source="combined").isel(member=member, response=0)
+        part = found.dataset.sel(source="combined").isel(member=member, response=0)
         np.testing.assert_allclose(part["std"], factor * std, rtol=1e-6)
         np.testing.assert_allclose(part["mean"], factor * mean, rtol=1e-6)
 
