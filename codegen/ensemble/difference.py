@@ -11,12 +11,12 @@ AGREEMENT = 1e-10
 SEED, RUN = 504, 3
 
 
-def difference_from_numpy(engine: CompiledEnsemble, states: int, sources: int, outputs: int) -> float:
+def difference_from_numpy(compiled: CompiledEnsemble, states: int, sources: int, outputs: int) -> float:
     """Return the largest difference between outputs of a run and those of NumPy, relative to the largest."""
     random = np.random.default_rng(SEED)
     shapes = [(sources, states, states), (2, states, states), (2, sources, states, states), (2, outputs, states)]
     steps = Steps(*(random.standard_normal(shape) for shape in shapes))
-    _, paths = engine.run(steps, SEED, RUN, 1, keep_paths=True)
+    _, paths = compiled.run(steps, SEED, RUN, 1, keep_paths=True)
     assert paths is not None
     expected = np.zeros((2, outputs))
     for s in range(sources):

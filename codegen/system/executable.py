@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from ...model.deprecation import warn_deprecated
 from ...model.system.linear_system import LinearSystem
 from ...model.system.time_conditions import Stops
 from ...model.tables import TableGroup, run_time_vector, table_values
@@ -53,15 +54,21 @@ class ExecutableSystem:
         return run_time_vector(self.groups) if self.groups else np.zeros(1)
 
     def __repr__(self) -> str:
-        return f"ExecutableSystem ({self.engine}) of {self.system!r}"
+        return f"ExecutableSystem ({self.code}) of {self.system!r}"
 
     def stops(self, until: float) -> Stops:
         """Return where integrators stop up to ``until`` (s) for the parameters in force."""
         return self.system.stops(self.parameters, until)
 
     @property
-    def engine(self) -> str:
+    def code(self) -> str:
+        """What evaluates the system: 'compiled' code or CasADi's 'interpreter'."""
         return "interpreter" if self.shared_library is None else "compiled"
+
+    @property
+    def engine(self) -> str:
+        warn_deprecated("executable.engine", "executable.code")
+        return self.code
 
     @cached_property
     def functions(self) -> SystemFunctions:

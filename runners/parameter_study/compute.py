@@ -90,13 +90,13 @@ def compute_chunk(study: Study, task: Task, chunk: Chunk) -> ChunkResult:
     """Return the statistics of the members of a chunk; one that fails leaves its reason and no more."""
     start = time.thread_time()
     result = empty_result(study, task, len(chunk.values))
-    reasons, engine = list(result.reason), sweep_of(study.executable)
+    reasons, compiled = list(result.reason), sweep_of(study.executable)
     rows = [study.system.output_index(name) for name in task.responses]
     for k, row in enumerate(chunk.values):
         try:
             member = member_numbers(study, task.quantities, row)
             found = sweep_member(
-                engine,
+                compiled,
                 member,
                 task.times,
                 relative_tolerance=task.relative_tolerance,

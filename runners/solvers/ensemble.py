@@ -95,7 +95,7 @@ def run_ensemble(
     EnsembleNeedsCompilerError, CompilerError, IntegrationError
     """
     system = executable.system
-    engine = ensemble_of(executable)
+    compiled = ensemble_of(executable)
     grid = np.asarray(times, float)
     if paths:
         count = max(1, int(np.ceil((times[-1] - system.start) / path_spacing - 1e-9)))
@@ -105,7 +105,7 @@ def run_ensemble(
 
     def chunk(first: int) -> tuple[NDArray, NDArray | None]:
         size = min(CHUNK, runs - first)
-        return engine.run(found.steps, seed, first, size, keep_paths=first < paths)
+        return compiled.run(found.steps, seed, first, size, keep_paths=first < paths)
 
     with Workers(threads or available_cores()) as pool:
         results = list(pool.map(chunk, firsts))

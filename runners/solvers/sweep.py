@@ -119,7 +119,7 @@ class BatchError(IntegrationError):
 
 
 def sweep(
-    engine: CompiledSweep,
+    compiled: CompiledSweep,
     executable: ExecutableSystem,
     times: ArrayLike,
     *,
@@ -132,7 +132,7 @@ def sweep(
 
     Parameters
     ----------
-    engine : CompiledSweep
+    compiled : CompiledSweep
     executable : ExecutableSystem
         Numbers: parameters, and tables with those of the mean response filled in.
     times : (k,) array
@@ -150,7 +150,7 @@ def sweep(
     ------
     TimeRangeError, DirectNoiseError, IntegrationError, DataError
     """
-    system, ends = engine.system, check_times(engine.system, times)
+    system, ends = compiled.system, check_times(compiled.system, times)
     check_relative_tolerance(relative_tolerance, LEAST_TOLERANCE)
     system.refuse_direct_noise(system.output_names if responses is None else responses)
     longest = min(LONGEST_SEGMENT, longest_interval, weighting_spacing or LONGEST_SEGMENT)
@@ -160,10 +160,10 @@ def sweep(
     segments = flight_segments(executable, (*np.unique(nodes[nodes < last]).tolist(), float(last)), longest)
     keep, sizes = weighting_spacing is not None, sizes_of_sweep(executable, float(last))
     with naming_fastest_root(executable):
-        result = engine.run(executable, segments, relative_tolerance, sizes, transition=keep)
+        result = compiled.run(executable, segments, relative_tolerance, sizes, transition=keep)
         if misjudged(sizes, result.covariance):
             sizes = sizes_of_sweep(executable, float(last), trust=False)
-            result = engine.run(executable, segments, relative_tolerance, sizes, transition=keep)
+            result = compiled.run(executable, segments, relative_tolerance, sizes, transition=keep)
     at = np.where(nodes > system.start, np.searchsorted(segments.end, nodes), -1)
     found = result.covariance[at], result.mean[at], result.error[at]
     if at[0] < 0:
@@ -186,7 +186,7 @@ def _at_start(
     return covariance, (matrices["G"] @ matrices["inputs"])[:, 0], 0.0
 
 
-def forward_mean(engine: CompiledSweep, relative_tolerance: float = 1e-9) -> Respond:
+def forward_mean(compiled: CompiledSweep, relative_tolerance: float = 1e-9) -> Respond:
     """Return what computes the mean response at given times by the sweep's own forward mean."""
 
     def mean(of: ExecutableSystem, times: NDArray[np.float64]) -> MeanResponse:
@@ -195,14 +195,14 @@ def forward_mean(engine: CompiledSweep, relative_tolerance: float = 1e-9) -> Res
         low, high = (np.array([getattr(p, side) for p in pieces])[which] for side in ("low", "high"))
         segments = Segments(float(times[0]), np.ascontiguousarray(times[1:]), low, high)
         with naming_fastest_root(of):
-            states, outputs, _ = engine.mean_history(of, segments, relative_tolerance)
+            states, outputs, _ = compiled.mean_history(of, segments, relative_tolerance)
         return MeanResponse(times, states, outputs)
 
     return mean
 
 
 def sweep_member(
-    engine: CompiledSweep,
+    compiled: CompiledSweep,
     numbers: ExecutableSystem,
     times: ArrayLike,
     *,
@@ -214,7 +214,7 @@ def sweep_member(
 
     Parameters
     ----------
-    engine : CompiledSweep
+    compiled : CompiledSweep
     numbers : ExecutableSystem
         Parameters and tables of the member.
     times, relative_tolerance, responses
@@ -226,12 +226,12 @@ def sweep_member(
     ------
     TimeRangeError, DirectNoiseError, IntegrationError, DataError
     """
-    member = fill(numbers, forward_mean(engine, 1e-2 * relative_tolerance))
-    return sweep(engine, member, times, relative_tolerance=relative_tolerance, responses=responses)
+    member = fill(numbers, forward_mean(compiled, 1e-2 * relative_tolerance))
+    return sweep(compiled, member, times, relative_tolerance=relative_tolerance, responses=responses)
 
 
 def batch(
-    engine: CompiledSweep,
+    compiled: CompiledSweep,
     executable: ExecutableSystem,
     parameter_sets: Sequence[NDArray[np.float64]] | NDArray[np.float64],
     times: ArrayLike,
@@ -244,7 +244,7 @@ def batch(
 
     Parameters
     ----------
-    engine : CompiledSweep
+    compiled : CompiledSweep
     executable : ExecutableSystem
         Tables common to all sets; those of the mean response are computed anew for each set.
     parameter_sets : (n, parameters) array or sequence
@@ -270,7 +270,7 @@ def batch(
     def one(values: NDArray[np.float64]) -> SweepResult | AscentwindError:
         try:
             member = executable.with_numbers(parameters=np.asarray(values, float))
-            return sweep_member(engine, member, times, relative_tolerance=relative_tolerance, fill=fill)
+            return sweep_member(compiled, member, times, relative_tolerance=relative_tolerance, fill=fill)
         except AscentwindError as error:
             return error
 

@@ -78,7 +78,7 @@ def response_dataset(
     mean = np.array([run.mean[rows] for run in runs])
     attributes = {
         "engine": "cvodes",
-        "code": case.executable.engine,
+        "code": case.executable.code,
         "method": options.method,
         "iteration": options.iteration,
         "relative_tolerance": options.relative_tolerance,

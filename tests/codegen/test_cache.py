@@ -105,11 +105,11 @@ def test_read_only_cache_that_holds_all_is_used(own_cache, monkeypatch):
     own_cache.chmod(0o500)
     try:
         again = Study.from_system(lag())
-        assert again.executable.engine == "compiled"
+        assert again.executable.code == "compiled"
         assert again.response_statistics([1.0]).attrs["engine"] == "sweep"
         assert sorted((p.name, p.stat().st_mtime_ns) for p in own_cache.iterdir()) == before
         with pytest.warns(InterpreterWarning, match="Read-only"):
-            assert executable_system(lag("another")).engine == "interpreter"
+            assert executable_system(lag("another")).code == "interpreter"
     finally:
         own_cache.chmod(0o700)
 

@@ -23,6 +23,8 @@ from ascentwind.codegen.toolchain.cache import CacheError, CacheWarning, Compile
 from ascentwind.codegen.toolchain.compiler import CompilerError, find_compiler
 from ascentwind.codegen.toolchain.library import InterpreterWarning
 from ascentwind.model import LinearSystem, define_system
+from ascentwind.model.deprecation import warn_deprecated
+from ascentwind.model.errors import DeprecatedNameWarning
 from ascentwind.runners import Study
 
 
@@ -49,7 +51,7 @@ def own_cache(tmp_path, monkeypatch):
 
 def test_compiled_functions_equal_the_interpreter(as504):
     """All functions at 20 random points against CasADi on tables looked up by NumPy."""
-    assert as504.executable.engine == "compiled"
+    assert as504.executable.code == "compiled"
     assert difference_from_core(as504.with_means, points=20, seed=1) <= 1e-12
 
 
@@ -138,7 +140,7 @@ def test_library_with_wrong_numbers_is_not_used(own_cache, monkeypatch):
     monkeypatch.setattr(compiled_module, "difference_from_core", lambda _: 1e-3)
     with pytest.warns(InterpreterWarning, match="differs from the interpreter"):
         found = executable_system(lag())
-    assert found.engine == "interpreter"
+    assert found.code == "interpreter"
     assert list(own_cache.glob("*.wrong-*"))
 
 
@@ -149,7 +151,7 @@ def test_without_a_compiler_the_interpreter_is_used_and_said_once(own_cache, mon
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         executable_system(lag())
-    assert first.engine == "interpreter"
+    assert first.code == "interpreter"
     assert Study(first).response_statistics([1.0]).variance.values[0, 0, 0] == pytest.approx(
         0.5 * (1 - np.exp(-2.0)), rel=1e-6
     )
@@ -176,7 +178,7 @@ def test_cache_that_others_can_write_is_refused(own_cache):
     with pytest.raises(CacheError, match="chmod 700"):
         cache_folder()
     with pytest.warns(InterpreterWarning, match="compiled code is not used"):
-        assert executable_system(lag()).engine == "interpreter"
+        assert executable_system(lag()).code == "interpreter"
 
 
 def test_operations_without_a_c_form_are_refused():
@@ -199,5 +201,15 @@ def test_written_operations_mean_what_casadi_means(own_cache):
         outputs={f"y{i}": term * x for i, term in enumerate(terms)}, parameters={"k": (k, 0.7)},
     )  # fmt: skip
     found = executable_system(system)
-    assert found.engine == "compiled"
+    assert found.code == "compiled"
     assert difference_from_core(found, points=40) <= 1e-12
+
+
+def test_the_old_name_of_what_evaluates_warns_once(cache):
+    warn_deprecated.cache_clear()
+    executable = executable_system(lag(), compile=False)
+    with pytest.warns(DeprecatedNameWarning, match=r"executable\.engine goes .* use executable\.code$"):
+        assert executable.engine == "interpreter"
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert executable.engine == executable.code

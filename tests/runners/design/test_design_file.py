@@ -41,7 +41,8 @@ def command(monkeypatch, *arguments: str) -> int:
     return int(stop.value.code or 0)
 
 
-def test_command_designs_verifies_trades_and_writes(as504, tmp_path, monkeypatch, capsys):
+@pytest.mark.slow
+def test_command_designs_recomputes_trades_and_writes(as504, tmp_path, monkeypatch, capsys):
     file, out = tmp_path / "task.toml", tmp_path / "out"
     file.write_text(DESIGN)
     assert command(monkeypatch, str(file), "--out", str(out)) == 0

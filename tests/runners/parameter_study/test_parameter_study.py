@@ -107,6 +107,7 @@ def test_bits_do_not_depend_on_chunks(as504, tmp_path, monkeypatch):
     assert found[0] == found[1] == found[2]
 
 
+@pytest.mark.slow
 def test_first_order_is_exact_for_what_is_linear(study, tmp_path):
     """Mean and sigma are linear in the gain: the peak is, and its share of the variance is all."""
     found = spread(run_parameter_study(dispersion(400, normal("gain", 0.3)), tmp_path, study=study))
@@ -124,6 +125,7 @@ def test_first_order_is_exact_for_what_is_linear(study, tmp_path):
     assert float(found["peak_time"][0]) == 3.0
 
 
+@pytest.mark.slow
 def test_first_order_of_correlated_quantities(study, tmp_path):
     """d sigma = sigma (dg/g) + (d sigma/d tau) dtau with correlated dg and dtau."""
     pair = [{"between": ["gain", "tau"], "coefficient": 0.8}]

@@ -146,6 +146,7 @@ def test_a_folder_at_work_is_refused(study, tmp_path):
     run_parameter_study(PLAN, tmp_path, study=study, progress=meanwhile)
 
 
+@pytest.mark.slow
 def test_a_full_disk_keeps_what_is_stored(study, tmp_path, monkeypatch):
     run_parameter_study(PLAN, tmp_path / "whole", study=study)
     folder, written = tmp_path / "full", []
@@ -169,6 +170,7 @@ def test_a_full_disk_keeps_what_is_stored(study, tmp_path, monkeypatch):
     assert (folder / "study.nc").read_bytes() == (tmp_path / "whole" / "study.nc").read_bytes()
 
 
+@pytest.mark.slow
 def test_a_limit_on_the_size_of_a_file(study, tmp_path):
     """A real refusal by the system: the assembled result is larger than the limit, chunks are not."""
     process = start(tmp_path, limit=12_000)

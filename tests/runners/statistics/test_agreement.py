@@ -92,6 +92,7 @@ def test_right_ensembles_are_not_called_wrong(study):
         assert ((low <= reference.std.values) & (reference.std.values <= high)).all()
 
 
+@pytest.mark.slow
 def test_command_prints_a_table_and_ends_with_the_verdict(spoil, monkeypatch, capsys, tmp_path):
     monkeypatch.setenv("COLUMNS", "80")
     monkeypatch.setattr(

@@ -173,7 +173,7 @@ def test_times_outside_the_flight_are_refused(as504):
 
 def test_interpreter_gives_the_same_statistics(as504):
     interpreted = Study.load("as504", compile=False)
-    assert (as504.executable.engine, interpreted.executable.engine) == ("compiled", "interpreter")
+    assert (as504.executable.code, interpreted.executable.code) == ("compiled", "interpreter")
     options = Cvodes(relative_tolerance=1e-9)
     a, b = (s.response_statistics([30.0], engine=options) for s in (as504, interpreted))
     np.testing.assert_allclose(a.variance.values, b.variance.values, rtol=1e-6)

@@ -176,6 +176,7 @@ def ascentwind(monkeypatch, capsys, tmp_path):
 RUN = ("run", "as504", "--times", "40,45", "--out", "found")
 
 
+@pytest.mark.slow
 def test_a_run_says_that_cvodes_agrees(ascentwind, tmp_path):
     code, out, _ = ascentwind(*RUN)
     assert code == 0

@@ -103,5 +103,6 @@ def test_unknown_names_offer_the_nearest(as504):
         equation_latex(as504, "4-2", "center_of_presure")
 
 
+@pytest.mark.slow
 def test_the_page_is_up_to_date(as504):
     assert PAGE.read_text() == equations_page(as504), "run 'ascentwind equations as504 --page docs/derivatives.md'"
