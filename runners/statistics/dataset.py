@@ -60,7 +60,7 @@ def statistics_dataset(
             "source": [*system.sources, COMBINED],
             "unit": ("response", units),
         },
-        provenance(case) | attributes,
+        {**provenance(case), **attributes},
     )
     for name, meaning in QUANTITIES.items():
         dataset[name].attrs |= {RULE: "response^2" if name == "variance" else "response", "long_name": meaning}
