@@ -148,7 +148,6 @@ def test_nonlinear_mean_is_a_choice(as504):
     wind = [float(b.sel(source="wind")) for b in both]
     assert wind[0] == pytest.approx(wind[1], rel=1e-9)
     for ask in (
-        lambda: study.batch([{}], [75.0]),
         lambda: study.sensitivity("bending_moment", 75.0),
         lambda: study.check_sensitivity("bending_moment", 75.0),
     ):
