@@ -266,7 +266,8 @@ def test_library_with_wrong_numbers_is_set_aside(own_cache, tmp_path, monkeypatc
     assert not list(own_cache.glob("*.so"))
 
 
-def test_library_found_in_the_cache_is_verified_too(own_cache):
+@pytest.mark.slow
+def test_library_found_in_the_cache_is_compared_too(own_cache):
     """Right bytes of the wrong system under another's name."""
     t, x, n = (ca.SX.sym(s) for s in ("t", "x", "n"))
     slower = define_system("lag", time=t, states={"x": (x, -0.999 * x + n)}, noises={"n": n}, outputs={"x": x})

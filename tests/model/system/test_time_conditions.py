@@ -134,6 +134,7 @@ TIMES = st.floats(0.05, 4.0).map(lambda t: round(t, 2))
 RATES = st.sampled_from([-3.0, -1.0, -0.2, 0.4])
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(TIMES, TIMES, TIMES, RATES, RATES, TIMES)
 @pytest.mark.filterwarnings("ignore::ascentwind.model.errors.UnstableSystemWarning")

@@ -270,6 +270,7 @@ def applied(folder: Path, sign: int = 1, **which: str):
     return apply_wind(folder, statistics, np.pi / 2, sign, "test")
 
 
+@pytest.mark.slow
 def test_the_command_writes_filter_mean_deviation_and_record_of_one_wind(falcon):
     before = tomllib.loads((falcon / "vehicle.toml").read_text())
     arguments = ["wind", "apply", str(falcon), "--component", "meridional", "--period", "february", "--edition", "2006"]

@@ -30,6 +30,7 @@ def command(monkeypatch, tmp_path, capsys):
     return run
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("encoding", ["cp1252", "latin-1", "ascii", "utf-8"])
 def test_consoles_without_sigma(encoding, tmp_path, cache):
     """The peaks of a run name sigma and plus-minus; no console is too old for them."""

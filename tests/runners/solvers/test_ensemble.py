@@ -233,6 +233,7 @@ def test_substeps_follow_a_singularity(start):
     assert abs(even.output[0, 0, 0] ** 2 * even.added[0, 0, 0, 0] / exact[0] - 1) > 0.01
 
 
+@pytest.mark.slow
 def test_a_singularity_within_the_flight_is_told():
     t, x, n = (ca.SX.sym(s) for s in ("t", "x", "n"))
     system = define_system(

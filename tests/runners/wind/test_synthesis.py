@@ -126,6 +126,7 @@ def test_average_responses_multiply_to_the_covariance():
     assert g[1, 0] == pytest.approx(s.covariance[0, 1] / np.sqrt(s.covariance[0, 0]))
 
 
+@pytest.mark.slow
 def test_linear_regression_is_poor_as_the_report_found():
     s = shipped_statistics().between(1000.0, 16000.0)
     for order in (2, 3):
