@@ -17,6 +17,7 @@ from ascentwind.model.vehicle.vehicle_file import read_vehicle_file
 from ascentwind.runners.construct.build_vehicle import build_vehicle, inputs_hash, table_entries
 from ascentwind.runners.construct.vehicle_figures import FIGURES
 from ascentwind.runners.construct.vehicle_numbers import STEPS
+from ascentwind.version import __version__
 
 AS504 = built_in_vehicles()["as504"]
 COARSE = 10.0  # s between rows
@@ -52,9 +53,10 @@ def test_shipped_tables_are_the_output_of_the_build(built):
         for name, values in found.items():
             size = np.abs(values).max()
             np.testing.assert_allclose(shipped[name], values, rtol=0, atol=1e-8 * size, err_msg=f"{path.name} {name}")
-    texts = [p.read_text() for p in written]
-    assert all(text.startswith("# computed by 'ascentwind build-vehicle'") for text in texts)
-    assert {t.split("\n")[0] for t in texts} == {(AS504 / p.name).read_text().split("\n")[0] for p in written}
+    texts, shipped_texts = ([path.read_text() for path in of] for of in (written, [AS504 / p.name for p in written]))
+    assert all(text.startswith(f"# computed by 'ascentwind build-vehicle' {__version__}; ") for text in texts)
+    inputs = [{text.split("\n")[0].partition("; ")[2] for text in of} for of in (texts, shipped_texts)]
+    assert inputs[0] == inputs[1]  # the version beside them is that of the release that computed the shipped ones
     load_vehicle(out)
 
 
