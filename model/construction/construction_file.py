@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import Any, get_args
 
 import numpy as np
 
-from ..errors import DataError
+from ..errors import DataError, PlausibilityWarning, suggestion
 from ..files.csv_table import CsvTable, Order, read_csv_table
 from ..files.folder_files import file_inside
 from ..files.toml_file import read_toml
@@ -29,6 +30,7 @@ from .sizes import check_sizes
 from .structure import LumpedMass, Stiffness, Tank, TankSection
 
 CONSTRUCTION_FILE = "construction.toml"
+LONGEST_BRIDGE = 0.08  # of the vehicle's length, from one item of the stiffness to another
 _ORIGIN = ("status", "source")
 _POLYNOMIAL = (
     ("begin", "s"),
@@ -66,6 +68,7 @@ def load_construction(folder: Path, changes: Mapping[str, Any] | None = None) ->
     atmosphere = None if entry.atmosphere is None else _atmosphere(file_inside(folder, entry.atmosphere.file))
     engines = tuple(_engine(folder, e) for e in entry.engines)
     normal_force = tuple(_normal_force(folder, e) for e in entry.normal_force)
+    _refuse_unused_parts(folder, entry.normal_force)
     with _located(toml):
         pitch = _pitch(file_inside(folder, entry.pitch.file), entry.pitch)
     tanks = []
@@ -164,8 +167,23 @@ def _stiffness(file: Path) -> Stiffness:
     bending, shear = table.column("bending", "N m2"), table.column("shear", "N")
     for column in ("bending", "shear"):
         table.require_positive(column)
+    _warn_of_bridged_items(table)
     with _located(file):
         return Stiffness(table.columns["station"], bending, shear)
+
+
+def _warn_of_bridged_items(table: CsvTable) -> None:
+    """Warn of a long stretch between the rows of two items: of one of them, or of a third, rows were lost."""
+    station, item = table.columns["station"], table.text["item"]
+    for i, step in enumerate(np.diff(station)):
+        if item[i] != item[i + 1] and step > LONGEST_BRIDGE * (station[-1] - station[0]):
+            warnings.warn(
+                f"{table.file}, line {table.lines[i + 1]}: no row between {station[i]:g} m of '{item[i]}' and "
+                f"{station[i + 1]:g} m of '{item[i + 1]}', and stiffness is interpolated from one to the other; add "
+                "the rows where one ends and the other begins",
+                PlausibilityWarning,
+                stacklevel=4,
+            )
 
 
 def _drag(file: Path) -> Drag:
@@ -211,6 +229,21 @@ def _normal_force(folder: Path, entry: NormalForceEntry) -> NormalForceComponent
         return NormalForceComponent(
             entry.name, np.array(entry.station_m), np.array(entry.shape), table.columns["mach"], slope
         )
+
+
+def _refuse_unused_parts(folder: Path, entries: tuple[NormalForceEntry, ...]) -> None:
+    """Refuse a column of the normal force that no part names."""
+    for name in dict.fromkeys(e.file for e in entries):
+        table = _read(file_inside(folder, name), "mach", "1")
+        parts = [e.name for e in entries if e.file == name]
+        for column in table.columns:
+            if column != "mach" and column not in parts:
+                raise DataError(
+                    f"is a part of the normal force that no [[normal_force]] of {CONSTRUCTION_FILE} places on the "
+                    f"vehicle{suggestion(column, parts)}; add its section or remove the column",
+                    file=table.file,
+                    column=column,
+                )
 
 
 def _pitch(file: Path, entry: PitchEntry) -> PitchProgramme:

@@ -14,6 +14,10 @@ from .construction import Construction
 from .tank_shape import TankShape
 
 GRAVITY = 9.80665  # m/s2
+LARGEST_MACH = 40.0
+LARGEST_REMAINDER = 0.1  # of the burn, by which tanks may differ
+LARGEST_KICK = math.radians(0.5)
+SMALLEST_GAP = 0.02  # of the vehicle's length, without mass
 
 
 def check_sizes(construction: Construction, file: Path) -> None:
@@ -85,9 +89,9 @@ def _sizes(construction: Construction) -> Iterator[tuple[str, str, bool]]:
     yield from beyond(
         "drag.file",
         coefficient,
-        (0.02, 4.0),
+        (0.1, 1.5),
         (-1.0, 40.0),
-        f"has a drag coefficient of {coefficient:g}; look at its area",
+        f"has a drag coefficient of {coefficient:g}, where slender launchers have 0.2 to 0.8; look at its area",
     )
     slope = np.array([max(c.slope.max(), -c.slope.min()) for c in construction.normal_force])
     for component, size in zip(construction.normal_force, slope, strict=True):
@@ -105,8 +109,105 @@ def _sizes(construction: Construction) -> Iterator[tuple[str, str, bool]]:
         if sizes:
             yield from sizes
             break
+    yield from _widths(construction)
+    yield from _gaps(construction)
+    yield from _machs(construction)
+    yield from _propellants(construction)
+    yield from _pitch(construction)
     altitude = construction.site.altitude
     yield from beyond(
         "site.altitude_m", altitude, (-500.0, 15_000.0), (-5000.0, 80_000.0),
         f"is {altitude:g} m, where no flight begins; look at its unit",
     )  # fmt: skip
+
+
+def _widths(construction: Construction) -> Iterator[tuple[str, str, bool]]:
+    """Radii that stiffnesses and masses tell of, against that of the reference area."""
+    own = math.sqrt(construction.reference_area / math.pi)
+    stiffness = construction.stiffness
+    radii = np.sqrt(stiffness.bending / stiffness.shear / 2.6)
+    k = int(np.argmax(radii))
+    if not 0.3 <= radii[k] / own <= 2.0:
+        why = (
+            f"has bending and shear of thin walls of at most {radii[k]:.3g} m radius (EI / kGA = 2.6 R^2, at station "
+            f"{stiffness.station[k]:g} m), where reference_area_m2 is a circle of {own:.3g} m radius; look at the "
+            "units of bending, shear and area"
+        )
+        yield "stiffness.file", why, False
+    wide = max(construction.masses, key=lambda m: m.radius, default=None)
+    if wide is not None and wide.radius > 1.5 * own:
+        why = (
+            f"has a radius of gyration of {wide.radius:g} m for '{wide.name}', where reference_area_m2 is a circle of "
+            f"{own:.3g} m radius; look at its unit"
+        )
+        yield "masses.file", why, False
+
+
+def _gaps(construction: Construction) -> Iterator[tuple[str, str, bool]]:
+    """Stretches of the vehicle without any mass."""
+    aft, forward = construction.aft_end, construction.forward_end
+    reached = aft
+    for mass in sorted(construction.masses, key=lambda m: m.begin):
+        yield from _gap(reached, mass.begin, forward - aft)
+        reached = max(reached, mass.end)
+    yield from _gap(reached, forward, forward - aft)
+
+
+def _gap(begin: float, end: float, length: float) -> Iterator[tuple[str, str, bool]]:
+    if end - begin > SMALLEST_GAP * length:
+        why = f"has nothing between {begin:g} and {end:g} m of the vehicle; add the masses if their rows were lost"
+        yield "masses.file", why, False
+
+
+def _machs(construction: Construction) -> Iterator[tuple[str, str, bool]]:
+    """Mach numbers that no ascent reaches in the air: another unit."""
+    curves = {"drag.file": construction.drag.mach}
+    curves |= {f"normal_force.{c.name}.file": c.mach for c in construction.normal_force}
+    for key, mach in curves.items():
+        if mach[-1] > LARGEST_MACH:
+            why = f"goes up to Mach {mach[-1]:g}, where no ascent meets air any more; look at the column mach"
+            yield key, why, False
+
+
+def _propellants(construction: Construction) -> Iterator[tuple[str, str, bool]]:
+    """Tanks run dry together, and engines draw all that they burn from them."""
+    flow = dict.fromkeys((t.name for t in construction.tanks), 0.0)
+    residual = dict(flow)
+    for group in construction.engines:
+        drawn = sum(group.draws.values())
+        if group.draws and drawn < 0.95:
+            why = f"take {drawn:.3g} of the flow from tanks, the rest from nowhere; shares of all propellants make 1"
+            yield f"engines.{group.name}.draws", why, False
+        for tank, share in group.draws.items():
+            flow[tank] += group.count * share * float(group.mass_flow.mean())
+        for tank, left in group.residual.items():
+            residual[tank] = max(residual[tank], left)
+    lasting = {t.name: (t.liquid - residual[t.name]) / flow[t.name] for t in construction.tanks if flow[t.name] > 0}
+    if lasting:
+        first, last = min(lasting, key=lasting.__getitem__), max(lasting, key=lasting.__getitem__)
+        if lasting[first] < (1 - LARGEST_REMAINDER) * lasting[last]:
+            why = (
+                f"lasts for {lasting[first]:.4g} s in {first} and {lasting[last]:.4g} s in {last}, and much of that is "
+                "left over; look at liquid_kg, residual_kg and the shares of draws"
+            )
+            yield f"tanks.{first}.liquid_kg", why, False
+
+
+def _pitch(construction: Construction) -> Iterator[tuple[str, str, bool]]:
+    """A pitch programme begins vertically and ends downrange."""
+    pitch = construction.pitch
+    if pitch.kind == "polynomials":
+        (begin, end, *powers), (last_begin, last_end, *last_powers) = pitch.segments[0], pitch.segments[-1]
+        first = float(np.polynomial.polynomial.polyval(np.clip(pitch.begin, begin, end), powers))
+        last = float(np.polynomial.polynomial.polyval(np.clip(pitch.arrest, last_begin, last_end), last_powers))
+    else:
+        first, last = float(pitch.angle[0]), float(pitch.angle[-1])
+    if abs(first) > LARGEST_KICK:
+        why = f"begins at {math.degrees(first):.3g} deg, to which the axis jumps from the vertical; add the rows before"
+        yield "pitch.file", why, False
+    if last < 0:
+        why = (
+            f"ends at {math.degrees(last):.3g} deg: uprange; pitch is positive downrange, towards azimuth_deg. Look at "
+            "its sign"
+        )
+        yield "pitch.file", why, False

@@ -106,8 +106,10 @@ def _compare(vehicle: Vehicle, along: StationLoads, file: Path) -> None:
         k = int(np.argmin(np.abs(along.station - load.station_m)))
         if abs(along.station[k] - load.station_m) > SAME_STATION:
             continue
-        for column in ("angle_of_attack", "engine_angle"):
-            own, other = vehicle.tables[f"loads.{load.output}.{column}"], along.tables[column][k]
+        for column, tables in along.tables.items():
+            own, other = vehicle.tables.get(f"loads.{load.output}.{column}"), tables[k]
+            if own is None:
+                continue
             times = other.argument[(other.argument >= own.argument[0]) & (other.argument <= own.argument[-1])]
             here, there = own.polynomial(times), other.polynomial(times)
             off = np.abs(here - there)
@@ -115,7 +117,8 @@ def _compare(vehicle: Vehicle, along: StationLoads, file: Path) -> None:
             if off[worst] > DIFFERENT * np.abs(here).max():
                 warnings.warn(
                     f"{file}, column '{column}', t = {times[worst]:g} s: is {there[worst]:.6g} at station "
-                    f"{load.station_m:g} m, but {load.table.file} has {here[worst]:.6g}; build both again",
+                    f"{load.station_m:g} m, but {load.table.file} has {here[worst]:.6g}; build both again, or look at "
+                    "the column's unit, sign and rows",
                     PlausibilityWarning,
                     stacklevel=3,
                 )

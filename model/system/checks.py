@@ -53,7 +53,7 @@ def scalar_expression(kind: str, name: str, value: Any) -> ca.SX:
     """
     _refuse_mx(kind, name, value)
     if isinstance(value, Real) and not isinstance(value, bool | np.bool_):
-        return ca.SX(float(value))
+        return ca.SX(_rounded(value))
     if not isinstance(value, ca.SX | ca.DM):
         raise SystemDefinitionError(
             f"{kind} '{name}' is {type(value).__name__} {_short(value)}; give a number or an expression of casadi.SX"
@@ -108,9 +108,17 @@ def finite_number(kind: str, name: str, value: Any) -> float:
         value = float(value)
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value.item()
-    if not isinstance(value, Real) or isinstance(value, bool | np.bool_) or not math.isfinite(value):
+    if not isinstance(value, Real) or isinstance(value, bool | np.bool_) or not math.isfinite(_rounded(value)):
         raise SystemDefinitionError(f"{kind} '{name}' is {_short(value)}; give a finite number")
     return float(value)
+
+
+def _rounded(value: Real) -> float:
+    """Return a number as the nearest float; infinity for an integer that is too large for one."""
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf if value > 0 else -math.inf
 
 
 def check_keys(kind: str, given: Mapping[str, object], known: Iterable[str]) -> None:

@@ -11,6 +11,7 @@ import re
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,9 +20,9 @@ from ambiance import Atmosphere
 from numpy.typing import NDArray
 
 from ..errors import DataError, PlausibilityWarning
+from ..tables import Table
 
 if TYPE_CHECKING:
-    from ..tables import Table
     from .vehicle import Vehicle
 
 Array = NDArray[np.float64]
@@ -32,6 +33,8 @@ FELT = 0.1  # of the largest dynamic pressure: below, ratios to it are of no con
 SHORTEST = 0.01  # s, between rows whose difference is taken as a rate
 SLOSH_ROOT = 1.841  # omega^2 R / a of the first lateral mode in a deep circular tank
 SAME_STATION = 1e-3  # m
+CURVED = 3.0  # times the waves of a uniform beam: slopes change faster where a vehicle is slender
+NEAREST = 0.02  # of the length, between places whose displacements tell a slope
 MOST_TOLD = 3
 _GROUPS = {  # tables without a prefix, by the file they stand in; the others are the trajectory's
     **dict.fromkeys(("mass", "moment_of_inertia", "center_of_gravity"), "rigid_body"),
@@ -97,7 +100,39 @@ def contradictions(vehicle: Vehicle) -> list[Contradiction]:
         *compared.moments(),
         *compared.stations(),
         *compared.rows(),
+        *compared.ends(),
+        *assumptions(vehicle),
     ]
+
+
+def assumptions(vehicle: Vehicle) -> Iterator[Contradiction]:
+    """Yield noise levels and dampings of vehicle.toml that are none of a launch vehicle; zero switches them off."""
+    toml, flight = vehicle.folder / "vehicle.toml", vehicle.end - vehicle.start
+
+    def beyond(key: str, x: float, low: float, high: float, why: str) -> Iterator[Contradiction]:
+        if x != 0 and not low <= x <= high:
+            yield Contradiction(f"is {x:g}, {why}", toml, key, None, False)
+
+    for name, noise in vehicle.file.noise.items():
+        tables = " and ".join(noise.tables)
+        yield from beyond(
+            f"noise.{name}.sigma", noise.sigma, 5e-4, 0.2,
+            f"{100 * noise.sigma:.3g} % of {tables}, which is known to better than a fifth and worse than a "
+            "two-thousandth; it is a relative deviation, 0.01 for 1 %",
+        )  # fmt: skip
+        if not noise.white:
+            yield from beyond(
+                f"noise.{name}.correlation_time_s", noise.correlation_time_s, 0.02, flight,
+                f"where the flight lasts {flight:.3g} s and no deviation of {tables} changes within 0.02 s; it is in "
+                "seconds",
+            )  # fmt: skip
+    text = "of the critical damping, where {} have {}; it is a ratio, not a percentage"
+    for i, mode in enumerate(vehicle.file.bending):
+        key = f"bending.{i}.damping"
+        yield from beyond(key, mode.damping, 5e-4, 0.05, text.format("bending modes", "0.001 to 0.03"))
+    for i, tank in enumerate(vehicle.file.slosh):
+        key = f"slosh.{i}.damping"
+        yield from beyond(key, tank.damping, 1e-4, 0.3, text.format("liquids", "0.0005 in smooth tanks to 0.1 baffled"))
 
 
 class _Compared:
@@ -222,9 +257,9 @@ class _Compared:
     def drag(self) -> Iterator[Contradiction]:
         drag = self.at("axial_drag")
         yield from self.beyond(
-            "trajectory", "axial_drag", drag / (self.q * self.area), (0.02, 4.0), (-0.1, 40.0),
-            "is {drag:.4g} N, which on {area:g} m2 at {q:.4g} Pa is a drag coefficient of {x:.3g}; look at the units "
-            "of axial_drag, dynamic_pressure and reference_area_m2",
+            "trajectory", "axial_drag", drag / (self.q * self.area), (0.1, 1.5), (-0.1, 40.0),
+            "is {drag:.4g} N, which on {area:g} m2 at {q:.4g} Pa is a drag coefficient of {x:.3g}, where slender "
+            "launchers have 0.2 to 0.8; look at the units of axial_drag, dynamic_pressure and reference_area_m2",
             self.felt, drag=drag, area=self.area, q=self.q,
         )  # fmt: skip
 
@@ -269,7 +304,20 @@ class _Compared:
                 "look at its unit and that of axial_acceleration",
                 acceleration > 0.5 * GRAVITY, frequency=frequency, acceleration=acceleration,
             )  # fmt: skip
-            total += self.at(f"{table}.mass")
+            own = np.sqrt(self.area / np.pi)
+            yield from self.beyond(
+                table, "frequency", radius / own, (0.1, 2.0), (0.0, np.inf),
+                "is {frequency:.4g} rad/s, which at {acceleration:.4g} m/s2 belongs to a tank of {radius:.3g} m "
+                "radius, where reference_area_m2 is a circle of {own:.3g} m; look at its unit, rad/s, and at both",
+                self.time == self.time[0], frequency=frequency, acceleration=acceleration, radius=radius, own=own,
+            )  # fmt: skip
+            mass = self.at(f"{table}.mass")
+            yield from self.beyond(
+                table, "mass", mass / self.mass, (1e-4, np.inf), (0.0, np.inf),
+                "is at most {own:.3g} kg on a vehicle of {mass:.4g} kg; look at its unit, or leave the tank out",
+                mass == mass.max(), own=mass, mass=self.mass,
+            )  # fmt: skip
+            total += mass
         if self.vehicle.slosh:
             yield from self.beyond(
                 f"slosh.{self.vehicle.slosh[0].name}", "mass", total / self.mass, (0.0, 0.9), (0.0, 1.0),
@@ -290,9 +338,45 @@ class _Compared:
                 "of no launch vehicle; look at its unit (rad/s), and at moment_of_inertia and mass",
                 frequency=frequency, length=length,
             )  # fmt: skip
+        for lower, higher in pairwise(tables):
+            one, other = self.at(f"{lower}.frequency"), self.at(f"{higher}.frequency")
+            yield from self.beyond(
+                higher, "frequency", other / one, (1.0, 5.0), (0.0, np.inf),
+                "of {other:.4g} rad/s is {x:.3g} times that of the mode before, {one:.4g} rad/s; modes of a beam "
+                "follow each other at 1.4 to 3 times: look at its unit (rad/s) and at the order of [[bending]]",
+                one=one, other=other,
+            )  # fmt: skip
         for table in tables:
             yield from self._shape(table, length)
+            yield from self._turns(table, length)
         yield from self._twice("bending", tables, "frequency", "generalized_mass")
+
+    def _turns(self, table: str, length: Array) -> Iterator[Contradiction]:
+        """The slope of a mode is that of its displacement, as far as places are near each other for its waves.
+
+        Between two places dx apart, half the sum of the slopes is off the slope of the chord by at most dx^2 / 12 times
+        the third derivative, (k dx)^2 / 12 of the largest slope for waves of k = (i + 1/2) pi / length in mode i.
+        """
+        names = ["gimbal", *(tank.name for tank in self.vehicle.slosh)]
+        places = np.array([0 * self.time, *(self.at(f"slosh.{name}.attach_point") for name in names[1:])])
+        moved, turned = (
+            np.array([self.at(f"{table}.{column}_at_{name}") for name in names]) for column in ("displacement", "slope")
+        )
+        largest = np.maximum(np.abs(turned).max(axis=0), np.abs(self.at(f"{table}.slope_at_sensor")))
+        order = np.argsort(places[:, 0])
+        for a, b in pairwise(order):
+            apart = places[b] - places[a]
+            chord = (moved[b] - moved[a]) / np.where(apart == 0, np.inf, apart)
+            waves = (int(table.split(".")[1]) + 0.5) * np.pi * apart / length
+            off = np.abs(chord - 0.5 * (turned[a] + turned[b])) / np.maximum(largest, 1e-300)
+            yield from self.beyond(
+                table, f"slope_at_{names[b]}", off / (0.1 + CURVED * waves**2 / 12), (0.0, 1.0), (0.0, np.inf),
+                f"is {{there:.4g}} and slope_at_{names[a]} {{here:.4g}} per m, but displacements {{from_:.4g}} and "
+                "{to:.4g} over {apart:.4g} m make a slope of {chord:.4g} per m; look at the signs and scales of both "
+                "displacements and slopes",
+                apart > NEAREST * length,
+                there=turned[b], here=turned[a], from_=moved[a], to=moved[b], apart=apart, chord=chord,
+            )  # fmt: skip
 
     def _shape(self, table: str, length: Array) -> Iterator[Contradiction]:
         """A mode's generalised mass, displacements and slopes against each other, the mass and the normal force."""
@@ -331,9 +415,9 @@ class _Compared:
     def aerodynamics(self) -> Iterator[Contradiction]:
         slope = self.at("normal_force_slope")
         yield from self.beyond(
-            "aerodynamics", "normal_force_slope", np.abs(slope), (0.3, 60.0), (0.0, 6000.0),
-            "of {slope:.4g} per rad is none that a launch vehicle has on its own cross-section ({area:g} m2); look at "
-            "its unit (1/rad) and at reference_area_m2",
+            "aerodynamics", "normal_force_slope", slope, (1.0, 20.0), (-6000.0, 6000.0),
+            "of {slope:.4g} per rad is none that a launch vehicle has on its own cross-section ({area:g} m2), where a "
+            "slender body that begins in a tip makes 2; look at its unit (1/rad), its sign and at reference_area_m2",
             self.felt, slope=slope, area=self.area,
         )  # fmt: skip
 
@@ -360,6 +444,8 @@ class _Compared:
 
         for load in self.vehicle.file.loads:
             yield from self._inertia(f"loads.{load.output}")
+            if load.forward_of_gimbal_m is not None:
+                yield from self._slosh_moment(f"loads.{load.output}", load.forward_of_gimbal_m)
             yield from self._moved_line(f"loads.{load.output}")
 
     def _moved_line(self, table: str) -> Iterator[Contradiction]:
@@ -389,6 +475,33 @@ class _Compared:
                 values=values, scale=scale,
             )  # fmt: skip
 
+    def _slosh_moment(self, table: str, station: float) -> Iterator[Contradiction]:
+        """A sloshing mass pushes its tank at the attach point: minus its moment about stations aft of that."""
+        for tank in self.vehicle.slosh:
+            mass, place = (self.at(f"slosh.{tank.name}.{c}") for c in ("mass", "attach_point"))
+            made, values = -mass * np.maximum(place - station, 0.0), self.at(f"{table}.slosh_{tank.name}")
+            yield from self.beyond(
+                table, f"slosh_{tank.name}", (values - made) / (mass * self.gyration), (-0.2, 0.2), (-np.inf, np.inf),
+                "is {values:.4g} N s2, but {mass:.4g} kg at {place:.4g} m make {made:.4g} N s2 at a station "
+                "{station:g} m forward of the gimbal plane; look at its sign and rows, and those of mass and "
+                "attach_point",
+                values=values, mass=mass, place=place, made=made, station=station,
+            )  # fmt: skip
+
+    def ends(self) -> Iterator[Contradiction]:
+        """All tables of the flight end together: it ends with the first of them, and times may be shifted."""
+        timed = [s for s in self.vehicle.sources if not s.name.startswith(("wind", "control."))]
+        common = float(np.median([s.last for s in timed]))
+        usual = float(np.median(np.diff(self.time)))
+        for source in timed:
+            if abs(source.last - common) > 1.5 * usual:
+                cut = "the flight is cut off there" if source.last < common else "is its time shifted?"
+                why = (
+                    f"has its last row at {source.last:g} s, where other tables end at {common:g} s: {cut}; look at "
+                    "its times, add rows that are missing, or end all tables together"
+                )
+                yield Contradiction(why, source.file, "time", None, False)
+
     def rows(self) -> Iterator[Contradiction]:
         """No row of a smooth table stands apart from those around it."""
         for name, table in self.vehicle.tables.items():
@@ -404,6 +517,30 @@ class _Compared:
                     float(table.argument[k]),
                     False,
                 )
+        if self.vehicle.file.wind.fitted:
+            yield from self._filter_rows()
+
+    def _filter_rows(self) -> Iterator[Contradiction]:
+        """No sample of the wind filter stands apart from those around it."""
+        shaping = self.vehicle.wind.shaping_filter
+        for name, unit, values in (
+            ("F", "per_m", shaping.F),
+            ("G", "per_root_m", shaping.G),
+            ("H", "m_per_s", shaping.H),
+        ):
+            for place in np.ndindex(values.shape[1:]):
+                found = _apart(Table(name, unit, shaping.altitude, values[:, *place], "cubic", shaping.kinks))
+                if found is not None:
+                    k, expected = found
+                    yield Contradiction(
+                        f"has {values[k, *place]:.6g} in {name}{[i + 1 for i in place]} at {shaping.altitude[k]:g} m "
+                        f"between samples that make {expected:.6g}; correct it",
+                        self.files["wind.filter"],
+                        f"{name}_{unit}",
+                        None,
+                        False,
+                    )
+                    break
 
     def _source(self, name: str) -> str:
         """Return under which name the file of a table is listed."""

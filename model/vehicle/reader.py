@@ -50,6 +50,8 @@ from .shipped import VEHICLE_FILE
 from .vehicle import TableSource, Vehicle
 from .vehicle_file import TableEntry, VehicleFile, WindEntry, WindRecordEntry, read_vehicle_file
 
+REGULAR = 1.5  # times the usual step: in a table whose other steps are shorter, rows were lost at a longer one
+
 
 def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehicle:
     """Load a vehicle folder.
@@ -278,7 +280,7 @@ class _Reader:
         breaks = tuple(sorted(self.events[event] for event in entry.events))
         self.discontinuities.update(breaks)
         x = csv.columns["time"]
-        _warn_of_gap(csv)
+        _warn_of_gap(csv, 4 if entry.interpolation in ("cubic", "pchip") else 10)
         if entry.interpolation == "step":
             self.discontinuities.update(x[1:].tolist())
         for column, unit, sign, _ in columns:
@@ -313,12 +315,18 @@ class _Reader:
                 )
 
 
-def _warn_of_gap(csv: CsvTable) -> None:
-    """Warn of rows far apart where the others are close: the values between them are interpolated."""
+def _warn_of_gap(csv: CsvTable, fewest: int) -> None:
+    """Warn of rows far apart where the others are close: the values between them are interpolated.
+
+    Of fewer steps than ``fewest`` nobody can tell which are usual; a curve of straight lines has them where it bends.
+    """
     x = csv.columns["time"]
     steps = np.diff(x)
     widest, usual = int(np.argmax(steps)), float(np.median(steps))
-    if steps.size >= 10 and steps[widest] > max(10 * usual, 0.05 * (x[-1] - x[0])):
+    regular = bool((steps < REGULAR * usual).sum() >= steps.size - 1)  # all others, rows beside events included
+    if steps.size >= fewest and steps[widest] > (
+        REGULAR * usual if regular else max(10 * usual, 0.05 * (x[-1] - x[0]))
+    ):
         warnings.warn(
             PlausibilityWarning(
                 f"{csv.file}, line {csv.lines[widest + 1]}: no rows between {x[widest]:g} and {x[widest + 1]:g} s, "

@@ -40,6 +40,7 @@ def run(
 
     Every peak is computed again by CVODES, one adjoint run back from it; exit code 1 when they disagree.
     """
+    from ...model.equations.stated_twice import compare_stated_twice
     from ..case.times import parse_times
     from ..present.style import words, write_figure
     from ..statistics.engines import engine_from
@@ -54,6 +55,7 @@ def run(
         raise UnusedOptionError("--set default_times is not used with --times; leave one of them out")
     study = load_study(vehicle, changes, SHOWN)
     flown = study.vehicle_for("a run")
+    compare_stated_twice(flown)
     chosen = engine_from(engine, compiled=study.executable.shared_library is not None, **settings)
     end_times = parse_times(times or flown.file.default_times)
     moment_time = None if along_vehicle is None else prepare_along_vehicle(study, along_vehicle)

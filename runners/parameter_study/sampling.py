@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from ...model.errors import AscentwindWarning
+from ...model.errors import AscentwindWarning, DataError
 from .distributions import marginal, quantile, score_correlation
 from .plan import Dispersion, ParameterStudyPlan
 from .quantities import Quantity
@@ -27,11 +27,24 @@ def member_values(plan: ParameterStudyPlan, quantities: Sequence[Quantity]) -> N
     Raises
     ------
     DataError
+        Also for numbers of the plan whose spread leaves no finite value.
 
     Warns
     -----
     UnbalancedSampleWarning
     """
+    with np.errstate(over="ignore", invalid="ignore"):
+        values = _values(plan, quantities)
+    if (bad := ~np.isfinite(values)).any():
+        k = int(np.argmax(bad.any(axis=0)))
+        raise DataError(
+            f"'{quantities[k].name}' takes values that are not finite; give smaller numbers",
+            column=f"{plan.kind}.quantity.{k}",
+        )
+    return values
+
+
+def _values(plan: ParameterStudyPlan, quantities: Sequence[Quantity]) -> NDArray[np.float64]:
     if plan.grid is not None:
         return np.array(list(product(*(q.axis() for q in plan.grid.quantity))))
     if plan.one_at_a_time is not None:

@@ -30,6 +30,7 @@ from numpy.typing import NDArray
 
 from ascentwind.codegen.system.executable import ExecutableSystem, executable_system
 from ascentwind.model.equations.assemble import assemble
+from ascentwind.model.equations.stated_twice import compare_stated_twice
 from ascentwind.model.errors import AscentwindError, AscentwindWarning
 from ascentwind.model.system.linear_system import LinearSystem
 from ascentwind.model.vehicle.reader import load_vehicle
@@ -172,7 +173,9 @@ def _difference(name: str, folder: Path) -> float:
         found = _statistics(study, times)
         size = {k: np.abs(v).max(axis=0, keepdims=True) for k, v in statistics.items()}
         apart = [np.abs(found[k] - v) / np.where(size[k] > 0, size[k], 1) for k, v in statistics.items()]
+        compare_stated_twice(vehicle)
         return float(np.max(apart)) if all(np.isfinite(a).all() for a in apart) else np.inf
+    compare_stated_twice(vehicle)
     middle, soon = 0.5 * (system.start + system.end), system.start + min(0.2, 0.1 * (system.end - system.start))
     found = [*study.matrices(middle), *_statistics(study, [soon]).values()]
     return 1.0 if all(np.isfinite(v).all() for v in found) else np.inf

@@ -121,6 +121,20 @@ SIZES = {
     "liquid in t": (TOML, "liquid_kg = 14885.0", "liquid_kg = 14.885", PlausibilityWarning, "of what the tank holds"),
     "altitude in km": (TOML, "altitude_m = 10.0", "altitude_m = 16000.0", PlausibilityWarning, "no flight begins"),
     "shear in kN": ("construction/stiffness.csv", ",250000000,", ",2500,", PlausibilityWarning, "thin wall of"),
+    "shear and bending swapped": ("construction/stiffness.csv", "bending [N m2],shear [N]", "shear [N],bending [N m2]",
+                                  PlausibilityWarning, "thin walls of at most"),
+    "drag in another area": ("construction/drag.csv", "1.1,0.6,", "1.1,1.97,", PlausibilityWarning, "of 1.97[;,]"),
+    "gyration in mm": ("construction/masses.csv", ",470,0.4,", ",470,400,", PlausibilityWarning, "radius of gyration"),
+    "a mass lost": ("construction/masses.csv", 'cones",20.75688,', 'cones",21.6,', PlausibilityWarning,
+                    "nothing between 20.7569 and 21.6 m"),
+    "mach in m/s": ("construction/drag.csv", "\n15,", "\n5100,", PlausibilityWarning, "goes up to Mach 5100"),
+    "half of one propellant": (TOML, "liquid_kg = 6765.0", "liquid_kg = 3400.0", PlausibilityWarning,
+                               "lasts for 77.* s in s1_rp1 and 157.* s in s1_lox"),
+    "propellant from nowhere": (TOML, "s1_lox = 0.6875", "s1_lox = 0.5875", PlausibilityWarning, "0.9 of the flow"),
+    "pitch uprange": ("construction/pitch.csv", "\n20,1.83,", "\n20,-1.83,", PlausibilityWarning, "uprange"),
+    "pitch that jumps": ("construction/pitch.csv", "\n0,0,", "\n0,4,", PlausibilityWarning, "jumps from the vertical"),
+    "part that is not placed": ("construction/normal_force.csv", "over [1/rad]", "over [1/rad],fins [1/rad]",
+                                DataError, r"no \[\[normal_force\]\] of construction.toml places"),
     "arrest": (TOML, 'kind = "gravity_turn" ', 'kind = "table"\narrest_s = 30.0 ', DataError, "ends at 20 s"),
 }  # fmt: skip
 
@@ -131,13 +145,38 @@ def test_sizes_that_contradict_each_other(tmp_path, case):
     path = copied(tmp_path) / file
     text = path.read_text()
     assert old in text
-    path.write_text(text.replace(old, new))
+    changed = text.replace(old, new)
+    if case == "part that is not placed":
+        changed = changed.replace(",assumed,", ",0.1,assumed,")
+    path.write_text(changed)
     if kind is DataError:
         with pytest.raises(DataError, match=message):
             load_construction(tmp_path / "mine")
     else:
         with pytest.warns(PlausibilityWarning, match=message):
             load_construction(tmp_path / "mine")
+
+
+def test_a_section_that_was_lost(tmp_path):
+    """The column of its slope is still there."""
+    toml = copied(tmp_path) / TOML
+    head, *parts = toml.read_text().split("[[normal_force]]\n")
+    toml.write_text("[[normal_force]]\n".join([head, *parts[:-1]]))
+    with pytest.raises(
+        DataError, match=r"normal_force.csv, column 'carry_over': is a part of the normal force that no"
+    ):
+        load_construction(toml.parent)
+
+
+def test_rows_of_the_stiffness_that_were_lost(tmp_path):
+    """From the thrust frame to the fairing without a row."""
+    file = copied(tmp_path) / "construction" / "stiffness.csv"
+    lines = file.read_text().splitlines()
+    first = next(i for i, line in enumerate(lines) if line.startswith("aft skirt"))
+    last = next(i for i, line in enumerate(lines) if line.startswith("upper-stage forward"))
+    file.write_text("\n".join(lines[:first] + lines[last:]) + "\n")
+    with pytest.warns(PlausibilityWarning, match="no row between 3.38582 m of 'thrust frame' and 18.7706 m of 'upper"):
+        load_construction(file.parents[1])
 
 
 def test_thrust_held_beyond_its_table():

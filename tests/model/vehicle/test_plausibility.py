@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 import re
 import shutil
 import warnings
@@ -14,6 +15,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from ascentwind.model import load_vehicle
+from ascentwind.model.equations.stated_twice import compare_stated_twice
 from ascentwind.model.equations.station_loads import load_station_loads
 from ascentwind.model.errors import DataError, PlausibilityWarning
 from ascentwind.model.vehicle.plausibility import station_in_name
@@ -59,6 +61,13 @@ def shifted(column: str, by: int) -> Callable[[list[str], Rows], None]:
         values = [row[k] for row in rows]
         for row, value in zip(rows, [*values[by:], *values[-1:] * by], strict=True):
             row[k] = value
+
+    return change
+
+
+def without(first: float, last: float) -> Callable[[list[str], Rows], None]:
+    def change(_: list[str], rows: Rows) -> None:
+        rows[:] = [row for row in rows if not first <= float(row[0]) <= last]
 
     return change
 
@@ -128,6 +137,23 @@ WARNED = {
     "slope fifty times": ("aerodynamics.csv", scaled("normal_force_slope", 50), r"look at its unit \(1/rad\)"),
     "moment in kN m": ("loads_station_10m.csv", scaled("angle_of_attack", 1e-3), "the normal force at the radius"),
     "row of mass": (R, scaled("mass", 1.02, only=100.0), "rises from .* in the next row"),
+    "normal force turned": ("aerodynamics.csv", scaled("normal_force_slope", -1.0), "that begins in a tip"),
+    "normal force over pi": ("aerodynamics.csv", scaled("normal_force_slope", 0.318), "that begins in a tip"),
+    "slosh frequency in rpm": ("slosh_s2_lox.csv", scaled("frequency", 9.55), "where reference_area_m2 is a circle of"),
+    "slosh mass in kt": ("slosh_s1_rp1.csv", scaled("mass", 1e-6), "or leave the tank out"),
+    "slosh mass in lb": ("slosh_s2_lox.csv", scaled("mass", 1 / 0.4536), "kg at 15.07 m make"),
+    "slosh moment turned": ("loads_station_10m.csv", scaled("slosh_s2_lox", -1.0), "kg at 15.07 m make"),
+    "attach point and frequency": ("slosh_s2_lox.csv", swapped("attach_point", "frequency"), "make .* at a station"),
+    "modes far apart": ("bending_2.csv", scaled("frequency", 3.28), "times that of the mode before"),
+    "modes out of order": ("bending_2.csv", scaled("frequency", 0.3), "times that of the mode before"),
+    "slope of a mode turned": ("bending_2.csv", scaled("slope_at_gimbal", -1.0), "over .* m make a slope of"),
+    "deflection of a mode turned": ("bending_1.csv", scaled("displacement_at_s1_rp1", -1.0), "over .* make a slope of"),
+    "deflection of a mode in ft": ("bending_2.csv", scaled("displacement_at_gimbal", 3.28), "over .* make a slope of"),
+    "time of one table": ("slosh_s1_rp1.csv", scaled("time", 0.7), "last row at .* the flight is cut off there"),
+    "time shifted": ("bending_2.csv", scaled("time", 1.05), "is its time shifted"),
+    "end of one table lost": ("slosh_s1_lox.csv", without(140, 200), "the flight is cut off there"),
+    "two rows lost": ("bending_1.csv", without(60, 61), "no rows between 59 and 62 s, where others are 1 s apart"),
+    "most rows lost": (R, without(12, 148), "no rows between 11 and 149 s"),
     "acceleration five rows late": (T, shifted("axial_acceleration", 5), r"\(thrust - axial_drag\) / mass"),
 }  # fmt: skip
 
@@ -205,6 +231,64 @@ def test_loads_along_the_vehicle_and_their_own_tables(tmp_path):
     folder = change_table(copied("falcon1", tmp_path), "loads_station_10m.csv", scaled("angle_of_attack", 1.1))
     with pytest.warns(PlausibilityWarning, match=r"at station 10 m, but loads_station_10m.csv has .*build both again"):
         load_station_loads(load_vehicle(folder))
+
+
+BESIDE = {  # file, change, what run tells
+    "mode of a load turned": (
+        "loads_station_10m.csv",
+        scaled("bending_1", -1.0),
+        "column 'bending_1'.*build both again",
+    ),
+    "inertia of another time": (R, shifted("moment_of_inertia", 30), "'second_moment'.*but moment_of_inertia make"),
+    "centre of gravity moved": (R, scaled("center_of_gravity", 1.1), "'first_moment'.*but mass and center_of_gravity"),
+    "normal force of another time": ("aerodynamics.csv", shifted("normal_force_slope", 30), "'arm'.*but normal_force"),
+}
+
+
+@pytest.mark.parametrize("vehicle", SHIPPED)
+def test_what_shipped_vehicles_state_twice_agrees(vehicle):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        compare_stated_twice(load_vehicle(SHIPPED[vehicle]))
+
+
+@pytest.mark.parametrize("case", BESIDE)
+def test_tables_beside_those_of_the_equations(tmp_path, case):
+    file, change, message = BESIDE[case]
+    vehicle = load_vehicle(change_table(copied("falcon1", tmp_path), file, change))
+    with pytest.warns(PlausibilityWarning, match=message):
+        compare_stated_twice(vehicle)
+
+
+ASSUMED = [
+    ("sigma = 0.01\n", "sigma = 0.573\n", "'noise.thrust.sigma': is 0.573, 57.3 % of thrust and control_thrust"),
+    ("sigma = 0.05\n", "sigma = 5e-5\n", "'noise.center_of_pressure.sigma': is 5e-05"),
+    ("correlation_time_s = 1.0 ", "correlation_time_s = 1000.0 ", "'noise.thrust.correlation_time_s': is 1000, where"),
+    ("correlation_time_s = 1.0 ", "correlation_time_s = 1e-3 ", "'noise.thrust.correlation_time_s': is 0.001, where"),
+    ("damping = 0.005 ", "damping = 0.5 ", "'bending.0.damping': is 0.5, of the critical damping"),
+    ("damping = 0.01 ", "damping = 1.0 ", "'slosh.0.damping': is 1, of the critical damping"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("old", "new", "message"), ASSUMED)
+def test_noise_levels_and_dampings_of_no_vehicle(tmp_path, old, new, message):
+    toml = copied("falcon1", tmp_path) / "vehicle.toml"
+    text = toml.read_text()
+    assert old in text
+    toml.write_text(text.replace(old, new, 1))
+    with pytest.warns(PlausibilityWarning, match=message):
+        load_vehicle(toml.parent)
+
+
+def test_a_sample_of_the_wind_filter_that_stands_apart(tmp_path):
+    (file,) = copied("falcon1", tmp_path).glob("*filter.json")
+    filter_ = json.loads(file.read_text())
+    filter_["G_per_root_m"][100][0][1] *= -1
+    file.write_text(json.dumps(filter_))
+    with pytest.warns(
+        PlausibilityWarning, match=r"'G_per_root_m': has -0.\d+ in G\[1, 2\] at \d+.* between samples that"
+    ):
+        load_vehicle(file.parent)
 
 
 def test_a_jump_at_an_event_is_no_row_apart():

@@ -86,6 +86,11 @@ def test_grid_and_one_at_a_time(study):
     np.testing.assert_array_equal(found, [[1.5, GAIN], [2.5, GAIN], [TAU, 2.0], [TAU, 5.0]])
 
 
+def test_numbers_that_leave_no_finite_value_are_refused(study):
+    with pytest.raises(DataError, match=r"dispersion.quantity.0.*'tau' takes values that are not finite"):
+        values(study, dispersion(1000, normal("tau", 1e308)))
+
+
 def test_limits_that_leave_nothing_are_refused(study):
     far = TRUNCATED | {"low": 50.0, "high": 60.0}
     with pytest.raises(DataError, match=r"'gain' is cut off between 50 and 60.*almost nothing"):
