@@ -60,6 +60,10 @@ class ExecutableSystem:
         """Return where integrators stop up to ``until`` (s) for the parameters in force."""
         return self.system.stops(self.parameters, until)
 
+    def pulses(self, until: float) -> NDArray[np.float64]:
+        """Return where integrators begin anew up to ``until`` (s), beside pulses of the coefficients."""
+        return self.system.pulses(self.parameters, until)
+
     @property
     def code(self) -> str:
         """What evaluates the system: 'compiled' code or CasADi's 'interpreter'."""

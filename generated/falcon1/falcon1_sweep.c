@@ -2269,6 +2269,11 @@ static void forward(const Segment *restrict g, const double *C, const double *P,
   }
 }
 
+/* Whether weights asked for too much of a segment, and steps are left to learn others */
+static int asked_too_much(int code, const Counters *done) {
+  return code == TOO_SMALL_A_STEP || (code == TOO_MANY_STEPS && done->steps + done->rejected < MOST_STEPS);
+}
+
 /* Sweep over `count` segments that end at end[]; the first begins at `start`.
  *
  * low, high      limits of table lookup in each segment
@@ -2311,7 +2316,7 @@ EXPORT int sweep(int count, double start, const double *end, const double *low, 
       code = sweep_segment(&f, begin, end[k], tolerance, smaller(MOST_STEPS, done.steps + done.rejected + FIRST_TRY),
                            &weights, &step, &g, &done, &why, stop);
       /* responses that grow a thousandfold within a segment: the weights of its start ask for too much */
-      unknown = code == TOO_SMALL_A_STEP || (code == TOO_MANY_STEPS && done.steps + done.rejected < MOST_STEPS);
+      unknown = asked_too_much(code, &done);
       if (code != DONE && !unknown) break;
     }
     if (unknown) {
@@ -2325,7 +2330,7 @@ EXPORT int sweep(int count, double start, const double *end, const double *low, 
         step = length / 16.0;
         code = sweep_segment(&f, begin, end[k], loose, smaller(MOST_STEPS, done.steps + done.rejected + LEARNING), &weights,
                              &step, &g, &done, &why, stop);
-        unknown = code == TOO_SMALL_A_STEP || (code == TOO_MANY_STEPS && done.steps + done.rejected < MOST_STEPS);
+        unknown = asked_too_much(code, &done);
       }
       if (code != DONE) break;
       forward(&g, C, P, P_next, result, inherited);

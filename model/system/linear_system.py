@@ -27,6 +27,7 @@ from .checks import (
     checked_covariance,
 )
 from .labels import Noise, Output, Parameter, State, block_of
+from .pulses import Coefficients, coefficients, pulse_marks
 from .switches import switch_times
 from .time_conditions import Condition, Stops, find_conditions, locate
 
@@ -324,10 +325,36 @@ class LinearSystem:
         SwitchError
             If a condition cannot be located; it says which and why.
         """
-        end = self.end
-        if not np.isfinite(end):  # doubled, so that few searches serve all end times
-            end = self.start + 2.0 ** np.ceil(np.log2(max(until - self.start, 1.0)))
-        return _located(self, np.asarray(parameters, float).tobytes() if self.conditions else b"", float(end))
+        return _located(self, np.asarray(parameters, float).tobytes() if self.conditions else b"", self._last(until))
+
+    def pulses(self, parameters: np.ndarray, until: float) -> np.ndarray:
+        """Return where integrators begin anew so that they do not pass over smooth pulses of the coefficients.
+
+        Parameters
+        ----------
+        parameters : (n_p,) array
+        until : float
+            s; those beyond it may be among them.
+
+        Returns
+        -------
+        (k,) array
+            s, increasing.
+        """
+        if self._coefficients is None or not until > self.start:
+            return np.zeros(0)
+        return _with_pulses(self, np.asarray(parameters, float).tobytes(), self._last(until))
+
+    @cached_property
+    def _coefficients(self) -> Coefficients | None:
+        matrices = (self.A, self.B, self.E @ self.input_values)
+        return coefficients(matrices, self.time, self.p, self.v)
+
+    def _last(self, until: float) -> float:
+        """Return the end; without one a time that is doubled, so that few searches serve all end times."""
+        if np.isfinite(self.end):
+            return float(self.end)
+        return float(self.start + 2.0 ** np.ceil(np.log2(max(until - self.start, 1.0))))
 
     @cached_property
     def A(self) -> ca.SX:
@@ -403,3 +430,10 @@ class LinearSystem:
 @lru_cache(maxsize=64)
 def _located(system: LinearSystem, parameters: bytes, end: float) -> Stops:
     return locate(system.conditions, system.discontinuities, np.frombuffer(parameters), system.start, end, system.name)
+
+
+@lru_cache(maxsize=64)
+def _with_pulses(system: LinearSystem, parameters: bytes, end: float) -> np.ndarray:
+    assert system._coefficients is not None
+    values = np.frombuffer(parameters)
+    return pulse_marks(system._coefficients, values, system.stops(values, end), system.start, end)

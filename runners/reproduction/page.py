@@ -143,7 +143,6 @@ def _verdict(calibration: Calibration) -> str:
     if not missed:
         return f"All within {100 * RULE:.0f} %."
     bound = [i.what for i in calibration.inputs if "bound" in _found(i, calibration)]
-    return (
-        f"Cannot be met within {100 * RULE:.0f} % at once: {'; '.join(missed)}. At a bound: "
-        f"{', '.join(bound) or 'none'}; the others trade one figure against another."
+    return f"Cannot be met within {100 * RULE:.0f} % at once: {'; '.join(missed)}. " + (
+        f"At a bound: {', '.join(bound)}." if bound else "No input is at a bound."
     )

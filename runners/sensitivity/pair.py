@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +26,7 @@ from ..solvers.flight_nodes import FlightNodes
 from ..solvers.start_functions import start_functions
 from ..solvers.time_nodes import interval_after, interval_before
 
-SLOPE_STEP = 1e-3  # s, of central differences of the output matrices, which are cubic in time
+SLOPE_STEP = 1e-6  # of the flight, of central differences of the output matrices, which are cubic in time
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,17 +111,22 @@ class AdjointPair:
     @cached_property
     def slopes(self) -> tuple[float, float]:
         """Derivatives of variance and mean with respect to t2, between discontinuities."""
-        low, high = self._low, self.end
-        if high < self.node:  # on a discontinuity: its left side
-            before, after = max(high - 2 * SLOPE_STEP, low), high
-        else:
-            high = interval_after(self.executable, self.node).high
-            before, after = max(self.node - SLOPE_STEP, low), min(self.node + SLOPE_STEP, high)
-        first, second = (self.executable.matrices(t, low, high) for t in (before, after))
-        i, m, span = self.response, self.at_end, after - before
+        low, high, at = self._low, self.end, self.end
+        step = SLOPE_STEP * (self.node - self.executable.system.start)
+        if high >= self.node:  # else on a discontinuity: its left side
+            high, at = interval_after(self.executable, self.node).high, self.node
+        step = min(step, 0.5 * (high - low))
+        middle = min(max(at, low + step), high - step)
+        three = [self.executable.matrices(t, low, high) for t in (middle - step, middle, middle + step)]
+        i, m = self.response, self.at_end
         C, u = m["C"][i], m["inputs"][:, 0]
-        C_rate = (second["C"][i] - first["C"][i]) / span + C @ m["A"]
-        direct = (second["G"][i] @ second["inputs"][:, 0] - first["G"][i] @ first["inputs"][:, 0]) / span
+
+        def rate(first: Any, second: Any, third: Any) -> Any:
+            """Of the parabola through three values, at ``at``."""
+            return ((third - first) / 2 + (at - middle) / step * (third - 2 * second + first)) / step
+
+        C_rate = rate(*(n["C"][i] for n in three)) + C @ m["A"]
+        direct = rate(*(n["G"][i] @ n["inputs"][:, 0] for n in three))
         variance = 2 * C_rate @ self.dual_at_end + float(np.sum(self.mask * (C @ m["B"]) ** 2))
         mean = C_rate @ self.states_at_end + C @ m["E"] @ u + direct
         return float(variance), float(mean)

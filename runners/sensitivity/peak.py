@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from .request import Request
 
 SCAN_POINTS = 40
-TIME_TOLERANCE = 1e-6  # s
+TIME_TOLERANCE = 1e-6  # of the time between two points of the scan
 
 
 def peak_time(case: Case, request: Request) -> tuple[float, bool]:
@@ -36,7 +36,7 @@ def peak_time(case: Case, request: Request) -> tuple[float, bool]:
     TimeRangeError
         If the system has no end.
     """
-    times = _range(case)
+    times = _with_sides(case, _range(case))
     scan = response_statistics(case, times, responses=[request.response])
     mean, variance = (scan[name].sel(source=request.source).values[:, 0] for name in ("mean", "variance"))
     best = int(np.argmax([request.sought(float(v), float(m)) for v, m in zip(variance, mean, strict=True)]))
@@ -55,12 +55,26 @@ def peak_time(case: Case, request: Request) -> tuple[float, bool]:
     switches = case.executable.stops(high).times.tolist()
     edges = [low, *(d for d in switches if low < d < high), high]
     for a, b in pairwise(edges):
-        a = beyond(case.system, a) if a in switches else a
-        candidates += [t for t in (a, b) if t in edges[1:-1]]
+        if a in switches:  # the value may jump up there
+            a = beyond(case.system, a)
+            candidates.append(a)
+        if b in switches:
+            candidates.append(b)
         if quantity(a)[1] > 0 > quantity(b)[1]:
-            candidates.append(float(root_scalar(lambda t: quantity(t)[1], bracket=(a, b), xtol=TIME_TOLERANCE).root))
+            candidates.append(
+                float(root_scalar(lambda t: quantity(t)[1], bracket=(a, b), xtol=TIME_TOLERANCE * (b - a)).root)
+            )
     found = max(candidates, key=lambda t: quantity(t)[0])
     return found, found in (times[0], times[-1])
+
+
+def _with_sides(case: Case, times: list[float]) -> list[float]:
+    """Return times and, between them, the right side of each switch: what jumps up there may fall before the next."""
+    switches = case.executable.stops(times[-1]).times
+    sides = [
+        beyond(case.system, float(d), times[-1]) for d in switches[(switches >= times[0]) & (switches < times[-1])]
+    ]
+    return sorted({*times, *sides})
 
 
 def _range(case: Case) -> list[float]:

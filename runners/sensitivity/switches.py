@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...model.system.time_conditions import Stops
+from ..solvers.time_nodes import just_after
 from .pair import AdjointPair
 
 NOTHING = 1e-9  # of the two sides of a switch, a difference between them that is rounding
@@ -64,7 +65,7 @@ def through_switches(
 ) -> SwitchGradient:
     """Return what ``variance_factor`` variance + ``mean_factor`` mean owes to the times of switches.
 
-    A largest value that lies on a switch (``at_peak``) goes with it: by its slope on the left.
+    A largest value that lies on a switch (``at_peak``) goes with it: by its slope on its own side.
     """
     executable, node = pair.executable, pair.node
     system, undefined, reach = executable.system, dict[int, str](), dict[int, float]()
@@ -72,11 +73,13 @@ def through_switches(
     if not any(any(condition.parameters) for condition in system.conditions):
         return SwitchGradient(found, undefined, reach)
     stops = executable.stops(node)
+    slope = float(np.dot([variance_factor, mean_factor], pair.slopes)) if at_peak else 0.0
     for k, velocities in enumerate(switch_velocities(pair, stops)):
         moved = np.flatnonzero((velocities != 0).any(axis=0)).tolist()
         if stops.after[k] < system.start or stops.before[k] > node or not moved:
             continue
         sides, at = _Sides(pair, stops, k, variance_factor, mean_factor), f"{stops.times[k]:g} s"
+        after = at_peak and just_after(system, node, float(stops.times[k]))
         if stops.before[k] <= system.start:
             if sides.jump:
                 undefined |= dict.fromkeys(moved, f"the switch that it moves lies at the start, {at}")
@@ -84,8 +87,7 @@ def through_switches(
             continue
         if stops.after[k] >= node:
             if at_peak:
-                on_variance, on_mean = pair.slopes
-                found[moved] += (variance_factor * on_variance + mean_factor * on_mean) * velocities[0, moved]
+                found[moved] += slope * velocities[0, moved]
             elif sides.jump or not sides.same_outputs:
                 undefined |= dict.fromkeys(moved, f"the switch that it moves lies on the end time, {at}")
             reach |= dict.fromkeys(moved, 0.0)
@@ -99,7 +101,7 @@ def through_switches(
             elif spread[i] > TOGETHER * np.abs(one[i]):
                 undefined[i] = f"two switches that it moves apart lie together at {at}"
             else:
-                found[i] += sides.jump * one[i]
+                found[i] += (sides.jump + (slope if after else 0.0)) * one[i]
                 reach[i] = min(reach.get(i, np.inf), float(gap / abs(one[i])))
     return SwitchGradient(found, undefined, reach)
 

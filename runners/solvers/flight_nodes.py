@@ -14,7 +14,7 @@ from ...codegen.nodes.matrix import NodeMatrix
 from ...codegen.system.executable import ExecutableSystem
 from ...model.errors import StepBudgetError
 from .collocation import Collocation, CompiledCollocation, collocation
-from .collocation_grid import STAGES, Grid, collocation_grid, longest_step, tables_at
+from .collocation_grid import STAGES, Grid, StepLengths, collocation_grid, step_lengths, tables_at
 from .step_budget import naming_fastest_root
 
 FROZEN = 7  # times at which the roots of A are looked at
@@ -53,24 +53,25 @@ class FlightNodes:
         executable: ExecutableSystem,
         functions: NodeFunctions,
         times: Sequence[float],
-        step: float | None = None,
+        steps: StepLengths | None = None,
         keep: bool = False,
     ) -> FlightNodes:
         """Evaluate everything from the start to the last of the end times, s.
 
-        ``step`` is the longest step, s; from the roots of A without it. ``keep`` is for many solutions
+        ``steps`` are those of the grid; from the roots of A without it. ``keep`` is for many solutions
         (:class:`CompiledCollocation`).
         """
         system, numbers = executable.system, functions.numbers(executable.parameters)
-        if step is None:
-            spread = system.start + (max(times) - system.start) * (np.arange(FROZEN) + 0.5) / FROZEN
+        flight = max(times) - system.start
+        if steps is None:
+            spread = system.start + flight * (np.arange(FROZEN) + 0.5) / FROZEN
             frozen = functions.matrices(spread, tables_at(executable.groups, spread), numbers)
-            step = longest_step(frozen["A"].dense)
-        if max(times) - system.start > MOST_STEPS * step:
-            time = 0.5 * (system.start + max(times))
+            steps = step_lengths(frozen["A"].dense, flight)
+        if flight > MOST_STEPS * steps.longest:
+            time = system.start + 0.5 * flight
             with naming_fastest_root(executable):
                 raise StepBudgetError(MOST_STEPS, f"t = {time:.6g} s", time=time)
-        grid = collocation_grid(executable, times, step)
+        grid = collocation_grid(executable, times, steps)
         nodes = grid.nodes.ravel()
         tables = tables_at(executable.groups, nodes)
         matrices = functions.matrices(nodes, tables, numbers)

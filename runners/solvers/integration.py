@@ -110,6 +110,8 @@ class Integrator:
             # CVODES counts from one output point to the next
             steps = max(LEAST_STEPS, 4 * self._options["max_num_steps"] // points)
             options = self._options | {"max_num_steps": min(steps, self._options["max_num_steps"])}
+            if points > 1:  # at rest its steps would grow beyond all bounds, and pass over what moves the system next
+                options["max_step_size"] = 1.0 / points
             self._by_count[points] = ca.integrator(
                 f"{self._function.name()}_{points}", "cvodes", self._function, 0.0, grid.tolist(), options
             )

@@ -61,7 +61,7 @@ def mean_response(
     states = [np.zeros(len(scale))]
     outputs: list[NDArray] = []
     response = executable.functions.response
-    for interval in intervals(executable, float(times[0]), float(times[-1])):
+    for interval in intervals(executable, float(times[0]), float(times[-1]), pulses=False):
         inside = times[(times > interval.begin) & (times <= interval.end)]
         parameters = executable.integrator_parameters(
             interval.begin, interval.end - interval.begin, interval.low, interval.high

@@ -68,7 +68,7 @@ def planar_mean(vehicle: Vehicle, executable: ExecutableSystem) -> PlanarMean:
     knots = mean_knots(system.start, system.end, system.discontinuities)
     start = flight.start(system.start).full().ravel()
     times, states, responses = [knots[:1]], [start[None]], [flight.outputs(system.start, start).full().T]
-    for interval in intervals(executable, system.start, system.end):
+    for interval in intervals(executable, system.start, system.end, pulses=False):
         inside = knots[(knots > interval.begin) & (knots <= interval.end)]
         # piece by piece, so that a flight that diverges is told before it tumbles
         for piece in np.split(inside, range(PIECE, inside.size, PIECE)):

@@ -25,9 +25,10 @@ from .mean_response import FillMeans, MeanResponse, Respond, with_mean_tables
 from .step_budget import naming_fastest_root
 from .time_nodes import Interval, intervals, on_flight, time_nodes
 from .tolerances import check_relative_tolerance
-from .typical_sizes import misjudged, sizes_of_sweep
+from .typical_sizes import mean_misjudged, misjudged, sizes_of_sweep
 
 LONGEST_SEGMENT = 1.0  # s; weights of the error control are renewed and the Gramians stay well scaled
+MOST_SEGMENTS = 5000  # for the sake of that, on a flight of hours or days
 LEAST_TOLERANCE = 1e-12
 
 
@@ -124,7 +125,7 @@ def sweep(
     times: ArrayLike,
     *,
     relative_tolerance: float = 1e-6,
-    longest_interval: float = LONGEST_SEGMENT,
+    longest_interval: float = float("inf"),
     weighting_spacing: float | None = None,
     responses: Sequence[str] | None = None,
 ) -> SweepResult:
@@ -153,7 +154,8 @@ def sweep(
     system, ends = compiled.system, check_times(compiled.system, times)
     check_relative_tolerance(relative_tolerance, LEAST_TOLERANCE)
     system.refuse_direct_noise(system.output_names if responses is None else responses)
-    longest = min(LONGEST_SEGMENT, longest_interval, weighting_spacing or LONGEST_SEGMENT)
+    longest = max(LONGEST_SEGMENT, float(ends[-1] - system.start) / MOST_SEGMENTS)
+    longest = min(longest, longest_interval, weighting_spacing or longest)
     nodes = time_nodes(executable, ends)
     # an end time at the start needs no integration, only a segment to read it in
     last = nodes[-1] if nodes[-1] > system.start else min(system.end, system.start + longest)
@@ -191,12 +193,20 @@ def forward_mean(compiled: CompiledSweep, relative_tolerance: float = 1e-9) -> R
 
     def mean(of: ExecutableSystem, times: NDArray[np.float64]) -> MeanResponse:
         pieces = intervals(of, float(times[0]), float(times[-1]))
-        which = np.searchsorted([p.end for p in pieces], times[1:])
+        switched = [p.end for p in intervals(of, float(times[0]), float(times[-1]), pulses=False)]
+        within = np.setdiff1d([p.end for p in pieces], switched)
+        ends = np.unique(np.concatenate([times[1:], within]))
+        which = np.searchsorted([p.end for p in pieces], ends)
         low, high = (np.array([getattr(p, side) for p in pieces])[which] for side in ("low", "high"))
-        segments = Segments(float(times[0]), np.ascontiguousarray(times[1:]), low, high)
+        segments = Segments(float(times[0]), ends, low, high)
+        sizes = sizes_of_sweep(of, float(times[-1]))
         with naming_fastest_root(of):
-            states, outputs, _ = compiled.mean_history(of, segments, relative_tolerance)
-        return MeanResponse(times, states, outputs)
+            states, outputs, _ = compiled.mean_history(of, segments, relative_tolerance, sizes)
+            if mean_misjudged(sizes, states):
+                sizes = sizes_of_sweep(of, float(times[-1]), trust=False)
+                states, outputs, _ = compiled.mean_history(of, segments, relative_tolerance, sizes)
+        asked = np.concatenate([[0], 1 + np.searchsorted(ends, times[1:])])
+        return MeanResponse(times, states[asked], outputs[asked])
 
     return mean
 

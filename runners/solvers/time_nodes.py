@@ -32,23 +32,37 @@ class Interval:
     high: float
 
 
-def intervals(executable: ExecutableSystem, begin: float, end: float, longest: float = float("inf")) -> list[Interval]:
+def intervals(
+    executable: ExecutableSystem, begin: float, end: float, longest: float = float("inf"), pulses: bool = True
+) -> list[Interval]:
     """Split [begin, end] where the system jumps, in order of time: as declared, and as its expressions say.
 
     On either side of a jump matrices are looked up a few roundings away from it, so that a switch which compiled code
     computes in its own way is seen from the right side; an end that falls on a jump is taken from the left, a begin
-    from the right. Intervals longer than ``longest``, s, are divided.
+    from the right. Intervals longer than ``longest``, s, are divided, and with ``pulses``
+    those that hold a smooth pulse.
     """
     stops = executable.stops(end)
     inside, low, high = stops.between(begin, end)
     edges = [begin, *stops.times[inside].tolist(), end]
     lows, highs = [low, *stops.after[inside].tolist()], [*stops.before[inside].tolist(), high]
     sides = zip(pairwise(edges), lows, highs, strict=True)
+    narrow = executable.pulses(end) if pulses else np.zeros(0)
+    apart = same_time(executable.system, end)
     found = []
     for (a, b), low, high in sides:
-        marks = np.linspace(a, b, 1 + max(1, int(np.ceil((b - a) / longest - 1e-9)))).tolist()
+        marks = np.linspace(a, b, 1 + max(1, int(np.ceil((b - a) / longest - 1e-9))))
+        marks = _with_marks(marks, narrow[(narrow > a) & (narrow < b)], apart).tolist()
         found += [Interval(*part, min(low, b), max(high, a)) for part in pairwise(marks)]
     return found
+
+
+def _with_marks(edges: NDArray[np.float64], more: NDArray[np.float64], apart: float) -> NDArray[np.float64]:
+    """Return edges and those of more times that are further than ``apart`` from each of them, in order."""
+    if not more.size:
+        return edges
+    near = np.abs(more[:, None] - edges[np.clip(np.searchsorted(edges, more)[:, None] - [1, 0], 0, edges.size - 1)])
+    return np.sort(np.concatenate([edges, more[near.min(axis=1) > apart]]))
 
 
 def interval_before(executable: ExecutableSystem, time: float) -> Interval:
@@ -113,6 +127,11 @@ def same_time(system: LinearSystem, times: ArrayLike) -> float:
     return max(SAME * (last - system.start), 4 * rounding(last, system.start))
 
 
-def beyond(system: LinearSystem, time: float) -> float:
-    """Return the nearest end time after a switch that is not the switch itself, s."""
-    return min(time + 2 * same_time(system, [time]), system.end)
+def beyond(system: LinearSystem, time: float, last: float | None = None) -> float:
+    """Return the nearest end time after a switch that is not the switch itself, asked for with others to ``last``."""
+    return min(time + 2 * same_time(system, [time if last is None else last]), system.end)
+
+
+def just_after(system: LinearSystem, time: float, switch: float) -> bool:
+    """Return whether an end time is the nearest one after a switch."""
+    return 0 < time - switch <= 3 * same_time(system, [time])

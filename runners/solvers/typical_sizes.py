@@ -124,3 +124,15 @@ def misjudged(sizes: NDArray[np.float64], covariance: NDArray[np.float64]) -> bo
         return False
     deviation = np.sqrt(np.maximum(np.einsum("ksrr->ksr", covariance), 0.0)).max(axis=(0, 1))
     return bool((deviation < MISJUDGED * sizes[-deviation.size :])[deviation > 0].any())
+
+
+def mean_misjudged(sizes: NDArray[np.float64], states: NDArray[np.float64]) -> bool:
+    """Return whether the mean of a state stays so far below its size that the forward mean did not resolve it.
+
+    Parameters
+    ----------
+    sizes : (n + n_y,) array
+    states : (k, n) array
+    """
+    largest = np.abs(states).max(axis=0)
+    return bool((largest < MISJUDGED * sizes[: largest.size])[largest > 0].any())

@@ -39,11 +39,13 @@ def response_figure(statistics: xr.Dataset, response: str, title: str) -> Figure
         )  # fmt: skip
         for color, values, label, line in curves:
             axes.plot(time, factor * values, line, color=COLORS[color], label=label, lw=2, marker=marker)
+        late = peak.time > 0.4 * time[0] + 0.6 * time[-1]  # the note stands on the side that has room
         axes.annotate(
             f"{LABEL}: {factor * peak.value:.3g} {unit} at {peak.time:g} s",
             (peak.time, factor * sign(peak.mean) * peak.value),
-            xytext=(12, 4 * sign(peak.mean)),
+            xytext=(-12 if late else 12, 4 * sign(peak.mean)),
             textcoords="offset points",
+            ha="right" if late else "left",
             color=COLORS[COMBINED],
         )
         axes.axhline(0, color="black", lw=0.6)

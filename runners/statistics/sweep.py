@@ -11,7 +11,7 @@ import xarray as xr
 from ...codegen.sweep.compiled import sweep_of
 from ...model.system.names import COMBINED
 from ..case.case import Case
-from ..solvers.sweep import LEAST_TOLERANCE, LONGEST_SEGMENT, SweepResult, sweep
+from ..solvers.sweep import LEAST_TOLERANCE, SweepResult, sweep
 from ..solvers.tolerances import check_relative_tolerance
 from .dataset import statistics_dataset, with_covariance
 from .engine import Engine, Progress, piece_of
@@ -29,7 +29,7 @@ class Sweep(Engine):
     relative_tolerance : float
         Relative, of every standard deviation, between 1e-12 and 1e-2.
     longest_interval : float
-        Flight is looked at in pieces no longer than this, s.
+        Flight is looked at in pieces no longer than this, and than 1 s or a 5000th of it, s.
 
     Raises
     ------
@@ -37,7 +37,7 @@ class Sweep(Engine):
     """
 
     relative_tolerance: float = 1e-7
-    longest_interval: float = LONGEST_SEGMENT
+    longest_interval: float = float("inf")
 
     name: ClassVar[str] = "sweep"
     label: ClassVar[str] = "sweep"

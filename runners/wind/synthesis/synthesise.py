@@ -6,6 +6,8 @@ import warnings
 from collections.abc import Callable
 from dataclasses import replace
 
+from threadpoolctl import threadpool_limits
+
 from ....model.errors import AscentwindWarning, UnknownNameError
 from ....model.wind.statistics import WindStatistics
 from ...solvers.least_squares import FitOptions, StalledFitWarning
@@ -95,7 +97,8 @@ def synthesise(
             f"a filter of order {order} needs at least {order + 2} altitudes, and {statistics.name} has "
             f"{statistics.altitude.size}; add levels or lower the order"
         )
-    result = function(statistics, order, options, **settings)
+    with threadpool_limits(1, user_api="blas"):  # the matrices are small: on all threads a fit takes five times as long
+        result = function(statistics, order, options, **settings)
     result = replace(result, shaping_filter=replace(result.shaping_filter, origin=statistics.origin))
     if not result.converged:
         warnings.warn(

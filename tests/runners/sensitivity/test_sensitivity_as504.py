@@ -11,13 +11,14 @@ from ascentwind.runners.sensitivity.check import _with_row, central_difference, 
 from ascentwind.runners.sensitivity.gradient import gradient_of
 from ascentwind.runners.sensitivity.pair import AdjointPair
 from ascentwind.runners.solvers.adjoint import AdjointSolver
+from ascentwind.runners.solvers.collocation_grid import StepLengths
 from ascentwind.runners.solvers.flight_nodes import FlightNodes
 
 
-def pair_of(as504, executable, step=None, time=30.0) -> AdjointPair:
+def pair_of(as504, executable, steps=None, time=30.0) -> AdjointPair:
     """Bending moment from wind alone, which no mean enters."""
     return AdjointPair(
-        FlightNodes.until(executable, node_functions_of(as504.executable), [time], step), 0, time, ("wind",)
+        FlightNodes.until(executable, node_functions_of(as504.executable), [time], steps), 0, time, ("wind",)
     )
 
 
@@ -37,7 +38,7 @@ def test_every_parameter_against_differences_of_the_same_discretisation(as504):
     """From wind alone, which no mean enters: rounding is all that stands between, so that small ones count too."""
 
     def pair(changes: dict[str, float]) -> AdjointPair:
-        return pair_of(as504, as504.with_parameters(changes).executable, 0.05)
+        return pair_of(as504, as504.with_parameters(changes).executable, StepLengths(0.05, 0.002))
 
     nominal = pair({})
     gradient = gradient_of(nominal, 1.0, 0.0).parameters

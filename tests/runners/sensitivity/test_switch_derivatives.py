@@ -134,6 +134,27 @@ def test_a_peak_on_a_switch_moves_along():
     assert found["derivative"].item() == pytest.approx(np.exp(-4), rel=1e-6)
 
 
+@pytest.mark.parametrize("fall", [0.0, 50.0])
+@pytest.mark.parametrize("ts", [1.5, 2.03, 2.1])
+def test_a_peak_after_a_jump_upward_moves_along(ts, fall):
+    """Noise until ts, where the output jumps to three times: the largest variance is just after, 9 (1 - e^(-2 ts))/2.
+
+    The output then falls within 0.02 s or not; the scan for the peak has points 0.15 s apart, two of them at 1.5 and 2.1.
+    """
+    study = Study.from_system(
+        noisy(
+            lambda t, ts: ca.if_else(t < ts, 1.0, 0.0),
+            lambda x, t, ts: x * ca.if_else(t < ts, 1.0, 3.0 * ca.exp(-fall * (t - ts))),
+            ts=ts,
+        )
+    )
+    found = study.sensitivity("x", "peak", quantity="variance")
+    assert found.attrs["t2_s"] == pytest.approx(ts, abs=1e-7)
+    assert found.attrs["value"] == pytest.approx(4.5 * (1 - np.exp(-2 * ts)), rel=1e-6)
+    assert found["derivative"].item() == pytest.approx(9 * np.exp(-2 * ts), rel=1e-4)
+    assert not found.attrs["peak_at_end_of_range"]
+
+
 # where there is no derivative
 
 

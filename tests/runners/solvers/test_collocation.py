@@ -9,8 +9,10 @@ import pytest
 from ascentwind.codegen.nodes.compiled import node_functions
 from ascentwind.codegen.nodes.matrix import NodeMatrix
 from ascentwind.model import define_system
+from ascentwind.runners import Cvodes
 from ascentwind.runners.solvers.collocation import TABLEAU, Collocation, CompiledCollocation
 from ascentwind.runners.solvers.collocation_grid import STAGES, Grid
+from ascentwind.runners.study import Study
 
 
 @pytest.fixture(scope="module")
@@ -114,3 +116,40 @@ def test_compiled_and_interpreted_agree(as504):
     matrices = as504.matrices(75.0)
     for name, expected in zip("ABC", matrices[:3], strict=True):
         np.testing.assert_allclose(compiled.matrices(t, v, z)[name].dense[1], expected, rtol=1e-12, atol=1e-300)
+
+
+@pytest.mark.parametrize("scale", [1e-9, 1e-6, 1e-3, 1.0, 1e3, 1e6])
+@pytest.mark.parametrize("second", [1.0, 0.05])
+def test_a_system_in_any_unit_of_time(scale, second):
+    """Two lags, tau and ``second`` tau, in series, to 3 tau, whose unit of time is a nanosecond or a fortnight.
+
+    White noise into the first, x' = -x / tau + n / sqrt(tau): variances and derivatives with respect to ln(tau) are
+    functions of t2 / tau alone. That of the first is (1 - e^(-2 t2 / tau)) / 2.
+    """
+    t, x, y, n, tau = (ca.SX.sym(name) for name in ("t", "x", "y", "n", "tau"))
+
+    def study(end: float, value: float) -> Study:
+        system = define_system(
+            "lags",
+            time=t,
+            states={"x": (x, -x / tau + n / ca.sqrt(tau)), "y": (y, (x - y) / (second * tau))},
+            noises={"n": n},
+            outputs={"x": x, "y": y},
+            parameters={"tau": (tau, value)},
+            end=end,
+        )
+        return Study.from_system(system)
+
+    here = study(4 * scale, scale)
+    first = here.sensitivity("x", 3 * scale, quantity="variance")
+    assert first.attrs["variance"] == pytest.approx(0.5 * (1 - np.exp(-6)), rel=1e-8)
+    assert first["derivative"].item() * scale == pytest.approx(-3 * np.exp(-6), rel=1e-7)
+    own, reference = (
+        s.sensitivity("y", 3 * u, quantity="variance") for s, u in ((here, scale), (study(4.0, 1.0), 1.0))
+    )
+    assert own.attrs["variance"] == pytest.approx(reference.attrs["variance"], rel=1e-9)
+    by_cvodes = here.response_statistics([3 * scale], engine=Cvodes(relative_tolerance=1e-10))
+    assert own.attrs["variance"] == pytest.approx(by_cvodes.variance.sel(response="y").values[0, 0], rel=1e-7)
+    assert own["derivative"].item() * scale == pytest.approx(reference["derivative"].item(), rel=1e-7)
+    peak = here.sensitivity("y", "peak", quantity="variance")
+    assert peak.attrs["t2_s"] == pytest.approx(4 * scale, rel=1e-12)

@@ -5,6 +5,7 @@ import warnings
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from ascentwind.model.errors import DataError, UnknownNameError
 from ascentwind.model.wind.range_reference import MONTHS, shipped_statistics
@@ -18,7 +19,7 @@ from ascentwind.runners.wind.fitting.intervals import covariance_interval, share
 from ascentwind.runners.wind.synthesis.impulse_response import average_responses
 from ascentwind.runners.wind.synthesis.result import SynthesisError
 from ascentwind.runners.wind.synthesis.state_space import _Form
-from ascentwind.runners.wind.synthesis.synthesise import SlowFilterWarning, synthesise
+from ascentwind.runners.wind.synthesis.synthesise import METHODS, SlowFilterWarning, synthesise
 from ascentwind.runners.wind.verification import (
     engine_covariance,
     ensemble_share_inside,
@@ -154,6 +155,20 @@ def test_appendix_c_search_costs_more_than_least_squares():
         descent = synthesise(s, "constrained-response", options=FitOptions(time_limit=3), search="appendix-c")
     assert descent.evaluations > 5 * squares.evaluations
     assert descent.rms_error < 5.0
+
+
+def test_a_fit_runs_on_one_thread_of_the_blas(monkeypatch):
+    """The matrices are so small that more threads, which wait for each other, take five times as long."""
+    used, (method, orders) = [], METHODS["linear-regression"]
+
+    def watched(*arguments, **settings):
+        used.extend(library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas")
+        return method(*arguments, **settings)
+
+    monkeypatch.setitem(METHODS, "linear-regression", (watched, orders))
+    with threadpool_limits(2, user_api="blas"):
+        synthesise(shipped_statistics().between(0.0, 16000.0), "linear-regression")
+    assert used and set(used) == {1}
 
 
 def test_a_fit_that_runs_out_of_time_says_so():
