@@ -340,6 +340,11 @@ class LinearSystem:
         -------
         (k,) array
             s, increasing.
+
+        Raises
+        ------
+        SwitchError
+            If a condition on time cannot be located.
         """
         if self._coefficients is None or not until > self.start:
             return np.zeros(0)

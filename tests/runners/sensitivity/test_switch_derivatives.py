@@ -139,7 +139,7 @@ def test_a_peak_on_a_switch_moves_along():
 def test_a_peak_after_a_jump_upward_moves_along(ts, fall):
     """Noise until ts, where the output jumps to three times: the largest variance is just after, 9 (1 - e^(-2 ts))/2.
 
-    The output then falls within 0.02 s or not; the scan for the peak has points 0.15 s apart, two of them at 1.5 and 2.1.
+    The output then falls within 0.02 s or not; the scan for the peak has points 0.15 s apart.
     """
     study = Study.from_system(
         noisy(
