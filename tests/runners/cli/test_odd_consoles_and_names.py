@@ -45,6 +45,7 @@ def test_consoles_without_sigma(encoding, tmp_path, cache):
     assert ("σ" if encoding == "utf-8" else "sigma") in printed
 
 
+@pytest.mark.slow
 def test_folder_that_looks_like_markup(command, vehicle_folder, tmp_path):
     folder = tmp_path / "[/red][bold]"
     folder.parent.mkdir()

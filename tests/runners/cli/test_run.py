@@ -36,6 +36,7 @@ def ascentwind(monkeypatch, capsys, tmp_path):
     return run
 
 
+@pytest.mark.slow
 def test_run_writes_tables_and_figures(ascentwind, tmp_path, as504):
     printed = ascentwind("run", "as504", "--times", "70:80:5", "--out", "found")
     assert re.search(r"bending moment\D+75 s\D+24\.\d+ MN m", printed)
