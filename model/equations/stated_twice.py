@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 import warnings
 
 import numpy as np
@@ -11,9 +12,12 @@ from ..errors import PlausibilityWarning
 from ..files.csv_table import read_csv_table
 from ..files.folder_files import file_inside
 from ..vehicle.columns import TIME, local_columns
+from ..vehicle.shipped import VEHICLE_FILE
 from ..vehicle.vehicle import Vehicle
 from .station_loads import StationLoads, load_station_loads
 
+CONSTRUCTION_FILE = "construction.toml"
+SAME_AREA = 1e-6  # relative
 DIFFERENT = 0.01  # of the largest value of the column
 
 
@@ -22,6 +26,7 @@ def compare_stated_twice(vehicle: Vehicle) -> None:
 
     The loads' own tables are stations along the vehicle. Forward of the aft end lies the whole vehicle: S_1 is there
     mass times X_CG - x and S_2 the moment of inertia. The integral of c'_N times x - X_CG is C'_N (X_CP - X_CG).
+    A construction beside the vehicle has its reference area.
 
     Raises
     ------
@@ -37,6 +42,7 @@ def compare_stated_twice(vehicle: Vehicle) -> None:
         _compare_whole(vehicle, load_station_loads(vehicle))
     if vehicle.file.tables.local_aerodynamics is not None:
         _compare_arm(vehicle)
+    _compare_area(vehicle)
 
 
 def _compare_whole(vehicle: Vehicle, along: StationLoads) -> None:
@@ -66,6 +72,25 @@ def _compare_arm(vehicle: Vehicle) -> None:
     made = slope * (pressure - gravity)
     what = "normal_force_slope, center_of_pressure and center_of_gravity"
     _tell(entry.file, arm.name, time, stated[np.isin(all_times, time)], made, what)
+
+
+def _compare_area(vehicle: Vehicle) -> None:
+    toml = vehicle.folder / CONSTRUCTION_FILE
+    if not toml.is_file():
+        return
+    try:
+        built = tomllib.loads(toml.read_text(encoding="utf-8")).get("reference_area_m2")
+    except (OSError, ValueError, RecursionError):  # faults of a file that is not used here are told by the build
+        return
+    area = vehicle.file.reference_area_m2
+    if isinstance(built, float) and abs(area - built) > SAME_AREA * built:
+        warnings.warn(
+            PlausibilityWarning(
+                f"{vehicle.folder / VEHICLE_FILE}, column 'reference_area_m2': is {area:g} m2, but {CONSTRUCTION_FILE} "
+                f"has {built:g} m2, and coefficients are on that; make them equal, or build the tables again"
+            ),
+            stacklevel=3,
+        )
 
 
 def _common(vehicle: Vehicle, times: NDArray[np.float64]) -> NDArray[np.float64]:

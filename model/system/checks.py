@@ -276,7 +276,7 @@ def checked_covariance(where: str, states: Sequence[str], p: ca.SX, given: Any) 
     else:
         try:
             matrix = np.array(ca.DM(given) if isinstance(given, ca.SX) else given, dtype=float)
-        except (TypeError, ValueError, NotImplementedError):
+        except (TypeError, ValueError, NotImplementedError, OverflowError):
             raise SystemDefinitionError(f"{where} is {type(given).__name__} {_short(given)}; give numbers") from None
         matrix = matrix.reshape(1, 1) if matrix.size == n == 1 else matrix
     if tuple(matrix.shape) != (n, n):

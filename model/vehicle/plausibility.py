@@ -501,6 +501,14 @@ class _Compared:
                     "its times, add rows that are missing, or end all tables together"
                 )
                 yield Contradiction(why, source.file, "time", None, False)
+        pressure = self.vehicle.tables["dynamic_pressure"]
+        before = pressure.values[pressure.argument < self.vehicle.start]
+        if before.size and self.q[0] > FELT * max(float(before.max()), float(self.q.max())):
+            why = (
+                f"is {self.vehicle.start:g} s, where the dynamic pressure is {self.q[0]:.4g} Pa already and the tables "
+                "have earlier rows: what the wind did before is left out; start earlier"
+            )
+            yield Contradiction(why, self.vehicle.folder / "vehicle.toml", "start_time_s", None, False)
 
     def rows(self) -> Iterator[Contradiction]:
         """No row of a smooth table stands apart from those around it."""

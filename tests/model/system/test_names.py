@@ -254,6 +254,7 @@ COVARIANCES = [
     (1.0, r"shape \(\); it is \(2, 2\)"),
     ([[1.0, 0.0], [0.0]], "give numbers"),
     ("identity", "give numbers"),
+    ([[10**400, 0], [0, 1]], "give numbers"),
 ]
 
 

@@ -252,6 +252,15 @@ def test_what_shipped_vehicles_state_twice_agrees(vehicle):
         compare_stated_twice(load_vehicle(SHIPPED[vehicle]))
 
 
+def test_area_of_the_construction(tmp_path):
+    """The construction of the same folder was built with its own."""
+    toml = copied("falcon1", tmp_path) / "vehicle.toml"
+    toml.write_text(toml.read_text().replace("reference_area_m2 = 2.21793", "reference_area_m2 = 3.0"))
+    vehicle = load_vehicle(toml.parent)
+    with pytest.warns(PlausibilityWarning, match=r"is 3 m2, but construction.toml has 2.21793 m2"):
+        compare_stated_twice(vehicle)
+
+
 @pytest.mark.parametrize("case", BESIDE)
 def test_tables_beside_those_of_the_equations(tmp_path, case):
     file, change, message = BESIDE[case]
@@ -266,6 +275,7 @@ ASSUMED = [
     ("correlation_time_s = 1.0 ", "correlation_time_s = 1000.0 ", "'noise.thrust.correlation_time_s': is 1000, where"),
     ("correlation_time_s = 1.0 ", "correlation_time_s = 1e-3 ", "'noise.thrust.correlation_time_s': is 0.001, where"),
     ("damping = 0.005 ", "damping = 0.5 ", "'bending.0.damping': is 0.5, of the critical damping"),
+    ("start_time_s = 10.0 ", "start_time_s = 60.0 ", "'start_time_s': is 60 s, where the dynamic pressure is"),
     ("damping = 0.01 ", "damping = 1.0 ", "'slosh.0.damping': is 1, of the critical damping"),
 ]  # fmt: skip
 
