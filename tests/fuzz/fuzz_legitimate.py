@@ -71,6 +71,14 @@ REASONS: tuple[tuple[str, str, str, str, float, str], ...] = (
         0.1,
         "places far apart in the waves of a mode, and liquid aft of the load station, leave only wide limits",
     ),
+    (
+        "vehicle",
+        r".*\.csv",
+        ".*",
+        "shift",
+        0.01,
+        "a smooth curve one row earlier or later is within 1 %, as data of a flight are; more is told",
+    ),
     # of a construction, whose tables are computed from one statement each
     (
         "construction",
@@ -130,6 +138,7 @@ REASONS: tuple[tuple[str, str, str, str, float, str], ...] = (
         0.05,
         "a sample within its neighbours' noise; deviations of the filter over altitude are held to 10 % of the table's",
     ),
+    ("filter", ".*", "altitude_m", "shift", 1.0, "moved as far as deviations over altitude allow"),
     ("filter", ".*", "source|name", ".*", ANY, "words"),
     # questions, and systems of one's own
     (
