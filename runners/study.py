@@ -6,7 +6,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
 import xarray as xr
 
 from ..codegen.sweep.compiled import sweep_of
@@ -18,8 +17,8 @@ from .sensitivity.check import check_sensitivity
 from .sensitivity.many import sensitivities
 from .sensitivity.one import sensitivity
 from .sensitivity.second import second_derivatives
-from .solvers.adjoint import AdjointSolver
-from .solvers.sweep import batch, sweep
+from .solvers.adjoint import AdjointSolver, adjoint_member
+from .solvers.sweep import batch, interpreted_weighting, sweep
 from .statistics.cvodes import Cvodes
 from .statistics.dataset import batch_dataset, with_members
 from .statistics.engine import Engine, Progress
@@ -163,9 +162,7 @@ class Study(Case):
             members = []
             for numbers in values:
                 member = self.mean.fill(self.executable.with_numbers(parameters=numbers))
-                solver = AdjointSolver(member, chosen)
-                runs = [solver.run(time) for time in ends]
-                members.append((np.array([run.mean for run in runs]), np.array([run.variance for run in runs])))
+                members.append(adjoint_member(member, ends, chosen))
         elif isinstance(chosen, Sweep):
             found = batch(
                 sweep_of(self.executable),
@@ -192,6 +189,8 @@ class Study(Case):
     ) -> xr.Dataset:
         """Return the weighting functions g(t2, t) of all responses for many end times, by one backward sweep.
 
+        Where nothing is compiled, the transition matrices that it takes are SciPy's.
+
         Parameters
         ----------
         times : iterable of float
@@ -213,6 +212,8 @@ class Study(Case):
         """
         ends = self.checked_times(end_times(times))
         self.check_spacing(spacing)
+        if engine is None and options is None and self.executable.shared_library is None:
+            return weighting_family(self, ends, interpreted_weighting(self.with_means, ends, spacing))
         what = "weighting functions of many end times are computed"
         chosen = engine_as(Sweep, engine_of_options(engine, options), Sweep(), what)
         found = sweep(
@@ -223,7 +224,8 @@ class Study(Case):
             weighting_spacing=spacing,
             responses=(),
         )
-        return weighting_family(self, found)
+        assert found.weighting is not None
+        return weighting_family(self, ends, found.weighting)
 
     def weighting_function(
         self,

@@ -17,12 +17,11 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ...codegen.sweep.compiled import sweep_of
 from ...model.errors import AscentwindError
 from ...model.vehicle.vehicle import Vehicle
 from ..case.provenance import data_hash
 from ..study import Study
-from .compute import Chunk, ChunkResult, Task, compute_chunk, empty_result
+from .compute import Chunk, ChunkResult, Task, code_of, compute_chunk, empty_result
 
 log = logging.getLogger(__name__)
 
@@ -249,7 +248,7 @@ def _identity(study: Study) -> dict[str, str]:
         "casadi": ca.CasadiMeta.version(),
         "numpy": np.__version__,
         "data": data_hash(study),
-        "code": sweep_of(study.executable).shared_library.key,
+        "code": code_of(study),
     }
 
 

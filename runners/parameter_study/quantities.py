@@ -56,10 +56,7 @@ def resolve_quantities(study: Study, plan: ParameterStudyPlan) -> tuple[Quantity
     ------
     DataError
         Unknown names with the nearest one, structure, a target named twice, a nominal value that is zero or not common.
-    ParameterValueError
-        The vehicle asks for the nonlinear mean, which members do not have.
     """
-    study.require_linear_mean("a parameter study")
     taken: dict[str, str] = {}
     found = []
     for i, planned in enumerate(plan.quantities):

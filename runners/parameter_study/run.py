@@ -22,7 +22,7 @@ from ..statistics.dataset import QUANTITIES
 from ..statistics.sweep import Sweep
 from ..study import Study
 from .cluster import compute_on_cluster
-from .compute import FAILED, STATUS, Chunk, ChunkResult, Task, chunks, compute_chunk
+from .compute import FAILED, STATUS, Chunk, ChunkResult, Task, chunks, compute_chunk, engine_name
 from .local import compute_locally
 from .plan import ParameterStudyPlan, read_plan
 from .quantities import Quantity, resolve_quantities
@@ -98,7 +98,7 @@ def run_parameter_study(
         The folder holds another study.
     OutputFolderError
         It cannot be written; what is stored stays.
-    SchedulerError, NoCompilerError
+    SchedulerError
     """
     file = Path(plan) if isinstance(plan, str | Path) else None
     plan = read_plan(plan)
@@ -213,7 +213,7 @@ def _dataset(
             "quantity_unit": ("quantity", [q.unit for q in task.quantities]),
             "quantity_nominal": ("quantity", [q.nominal for q in task.quantities]),
         },
-        provenance(study) | {"plan": plan.model_dump_json(exclude_none=True), "engine": "sweep"},
+        provenance(study) | {"plan": plan.model_dump_json(exclude_none=True), "engine": engine_name(study)},
     )
     for name in ("mean", "std"):
         data[name].attrs |= {RULE: "response", "long_name": f"{QUANTITIES[name]} of a member"}

@@ -17,12 +17,11 @@ import xarray as xr
 from filelock import FileLock, Timeout
 from numpy.typing import NDArray
 
-from ...codegen.sweep.compiled import sweep_of
 from ...model.errors import AscentwindError, OutputFolderError
 from ..case.provenance import provenance
 from ..present.files import prepare_folder, write_bytes
 from ..study import Study
-from .compute import Chunk, ChunkResult, Task
+from .compute import Chunk, ChunkResult, Task, code_of
 from .plan import ParameterStudyPlan
 
 log = logging.getLogger(__name__)
@@ -45,7 +44,7 @@ def identity_of(study: Study, plan: ParameterStudyPlan, task: Task, values: NDAr
         "values of the members (SHA-256)": hashlib.sha256(np.ascontiguousarray(values).tobytes()).hexdigest(),
         **{key: made_by[key] for key in ("system", "structure", "data_sha256", "ascentwind", "casadi", "numpy")},
         "scipy": scipy.__version__,
-        "compiled sweep": sweep_of(study.executable).shared_library.key,
+        "compiled sweep": code_of(study),
     }
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -65,6 +66,28 @@ class AdjointHistory:
     noise: NDArray[np.float64]
     inputs: NDArray[np.float64]
     direct: NDArray[np.float64]
+
+
+def adjoint_member(
+    numbers: ExecutableSystem, times: Sequence[float], settings: CvodesSettings
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return mean (times, responses) and variance (times, responses, sources) of one set of numbers.
+
+    Parameters
+    ----------
+    numbers : ExecutableSystem
+        With its tables of the mean response filled in.
+    times : sequence of float
+        End times, s.
+    settings : CvodesSettings
+
+    Raises
+    ------
+    IntegrationError, StepBudgetError
+    """
+    solver = AdjointSolver(numbers, settings)
+    runs = [solver.run(time) for time in times]
+    return np.array([run.mean for run in runs]), np.array([run.variance for run in runs])
 
 
 class AdjointSolver:

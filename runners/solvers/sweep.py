@@ -10,11 +10,14 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.integrate import solve_ivp
 
 from ...codegen.sweep.compiled import sweep_of
 from ...codegen.sweep.integrator import CompiledSweep
 from ...codegen.sweep.segments import Segments
+from ...codegen.system.evaluation import MatrixEvaluator
 from ...codegen.system.executable import ExecutableSystem
+from ...codegen.system.functions import state_scales
 from ...codegen.toolchain.cache import CacheError
 from ...codegen.toolchain.interruption import Workers
 from ...codegen.toolchain.library import InterpreterWarning
@@ -22,7 +25,7 @@ from ...model.errors import AscentwindError, IntegrationError, TimeRangeError
 from ...model.system.linear_system import LinearSystem
 from .cores import available_cores
 from .mean_response import FillMeans, MeanResponse, Respond, with_mean_tables
-from .step_budget import naming_fastest_root
+from .step_budget import at_most, check_explicit_steps, naming_fastest_root
 from .time_nodes import Interval, intervals, on_flight, time_nodes
 from .tolerances import check_relative_tolerance
 from .typical_sizes import mean_misjudged, misjudged, sizes_of_sweep
@@ -30,6 +33,7 @@ from .typical_sizes import mean_misjudged, misjudged, sizes_of_sweep
 LONGEST_SEGMENT = 1.0  # s; weights of the error control are renewed and the Gramians stay well scaled
 MOST_SEGMENTS = 5000  # for the sake of that, on a flight of hours or days
 LEAST_TOLERANCE = 1e-12
+MOST_STEPS = 100_000  # of SciPy's DOP853, where nothing is compiled
 
 
 def available_sweep(executable: ExecutableSystem) -> CompiledSweep | None:
@@ -290,6 +294,44 @@ def batch(
     if len(completed) < len(found):
         raise BatchError({k: e for k, e in enumerate(found) if isinstance(e, AscentwindError)}, completed)
     return list(completed.values())
+
+
+def interpreted_weighting(executable: ExecutableSystem, times: ArrayLike, spacing: float) -> WeightingFunctions:
+    """Return the weighting functions without compiled code: transition matrices of the segments by SciPy's DOP853.
+
+    Parameters
+    ----------
+    executable : ExecutableSystem
+    times : (k,) array
+        End times, increasing, after the start, s.
+    spacing : float
+        Longest segment, s.
+
+    Raises
+    ------
+    TimeRangeError, IntegrationError, StepBudgetError
+    """
+    system, ends = executable.system, check_times(executable.system, times)
+    n, nodes = len(system.states), time_nodes(executable, ends)
+    last = nodes[-1] if nodes[-1] > system.start else min(system.end, system.start + spacing)
+    segments = flight_segments(executable, (*np.unique(nodes[nodes < last]).tolist(), float(last)), spacing)
+    check_explicit_steps(executable, intervals(executable, system.start, float(last)), MOST_STEPS)
+    A = MatrixEvaluator(executable, ("A",))
+    scale, transitions, begin = state_scales(system), [], system.start
+    for end, low, high in zip(segments.end, segments.low, segments.high, strict=True):
+
+        def rate(t: float, y: NDArray[np.float64], low: float = low, high: float = high) -> NDArray[np.float64]:
+            (matrix,) = A(t, low, high)
+            return ((matrix * scale / scale[:, None]) @ y.reshape(n, n)).ravel()
+
+        budgeted = at_most(rate, MOST_STEPS, "t = {:.6g} s")
+        found = solve_ivp(budgeted, (begin, end), np.eye(n).ravel(), "DOP853", rtol=1e-9, atol=1e-12)
+        if not found.success:
+            raise IntegrationError(f"the transition from {begin:g} s to {end:g} s: {found.message}")
+        transitions.append(found.y[:, -1].reshape(n, n) * scale[:, None] / scale)
+        begin = end
+    at = np.where(nodes > system.start, np.searchsorted(segments.end, nodes), -1)
+    return _weighting_functions(executable, segments, at, np.array(transitions))
 
 
 def check_times(system: LinearSystem, times: ArrayLike) -> NDArray[np.float64]:

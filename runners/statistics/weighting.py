@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import xarray as xr
 
@@ -9,7 +11,7 @@ from ..case.case import Case
 from ..case.provenance import provenance
 from ..present.netcdf import RULE
 from ..solvers.adjoint import AdjointHistory
-from ..solvers.sweep import SweepResult
+from ..solvers.sweep import WeightingFunctions
 
 NOISE_RULE = "response s^-0.5"  # of white noise, whose spectrum is 1 per hertz on both sides
 
@@ -57,10 +59,9 @@ def weighting_dataset(case: Case, time: float, history: AdjointHistory) -> xr.Da
     )
 
 
-def weighting_family(case: Case, found: SweepResult) -> xr.Dataset:
-    """Return the weighting functions of all end times of a sweep as a dataset."""
-    system, weighting = case.system, found.weighting
-    assert weighting is not None
+def weighting_family(case: Case, times: Sequence[float], weighting: WeightingFunctions) -> xr.Dataset:
+    """Return the weighting functions of all end times (s) as a dataset."""
+    system = case.system
     dims = {
         "noise_weighting": ("time", "response", "noise", "t"),
         "input_weighting": ("time", "response", "input", "t"),
@@ -73,7 +74,7 @@ def weighting_family(case: Case, found: SweepResult) -> xr.Dataset:
     return xr.Dataset(
         {name: (dims[name], np.moveaxis(values[name], 1, -1), attributes[name]) for name in dims},
         {
-            "time": ("time", found.times, {"units": "s", "long_name": "flight time t2"}),
+            "time": ("time", list(times), {"units": "s", "long_name": "flight time t2"}),
             "t": ("t", weighting.times, {"units": "s", "long_name": "time of the impulse"}),
             "response": list(system.output_names),
             "unit": ("response", [o.unit for o in system.outputs]),

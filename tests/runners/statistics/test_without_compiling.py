@@ -45,6 +45,32 @@ def test_a_batch_is_computed_by_cvodes(interpreted):
         np.testing.assert_allclose(part["mean"], factor * mean, rtol=1e-6)
 
 
+def test_weighting_functions_of_many_end_times_are_those_of_each(interpreted):
+    found = interpreted.weighting_functions([2.0, 3.0], spacing=0.25)
+    for time in (2.0, 3.0):
+        alone = interpreted.weighting_function(time, spacing=0.25, engine=Cvodes(relative_tolerance=1e-10))
+        for name in ("noise_weighting", "input_weighting"):
+            family = found[name].sel(time=time)
+            expected = alone[name].interp(t=family["t"][family["t"] <= time], method="cubic")
+            size = float(abs(alone[name]).max())
+            np.testing.assert_allclose(family.sel(t=expected["t"]), expected, atol=1e-4 * size)
+            np.testing.assert_allclose(family.sel(t=0.0), alone[name].sel(t=0.0), rtol=1e-7, atol=1e-9 * size)
+
+
+def test_a_parameter_study_is_computed_by_cvodes(interpreted, tmp_path):
+    """Of a lag whose output is its gain times what it is for one."""
+    plan = dispersion(12, normal("gain", 0.1)) | {"times": "2, 3", "relative_tolerance": 1e-8}
+    found = run_parameter_study(plan, tmp_path / "study", study=interpreted)
+    assert found.data.attrs["engine"] == "cvodes"
+    assert found.computed.all()
+    mean, std = closed_form(np.array([2.0, 3.0]))
+    factor = found.data["value"].values / GAIN
+    np.testing.assert_allclose(found.data["std"].sel(source="combined").values[:, :, 0], factor * std, rtol=1e-6)
+    np.testing.assert_allclose(found.data["mean"].values[:, :, 0], factor * mean, rtol=1e-6)
+    again = run_parameter_study(plan, tmp_path / "study", study=interpreted)
+    np.testing.assert_array_equal(again.data["std"], found.data["std"])
+
+
 def test_questions_without_an_engine_are_answered(interpreted):
     std = closed_form(3.0)[1]
     assert interpreted.sensitivity("x", 3.0)["derivative"].sel(parameter="gain") == pytest.approx(std / GAIN, rel=1e-7)
@@ -64,13 +90,8 @@ def test_questions_without_an_engine_are_answered(interpreted):
         (lambda s, _: s.response_statistics([3.0], engine=Ensemble()), EnsembleNeedsCompilerError),
         (lambda s, _: s.batch([{}], [3.0], engine=Sweep()), NoCompilerError),
         (lambda s, _: s.batch([{}], [3.0], threads=1), NoCompilerError),
-        (lambda s, _: s.weighting_functions([3.0]), NoCompilerError),
-        (
-            lambda s, path: run_parameter_study(
-                dispersion(2, normal("gain", 0.1)) | {"times": "3"}, path / "study", study=s
-            ),
-            NoCompilerError,
-        ),
+        (lambda s, _: s.weighting_functions([3.0], engine="sweep"), NoCompilerError),
+        (lambda s, _: s.weighting_functions([3.0], engine=Sweep()), NoCompilerError),
     ],
 )
 def test_what_needs_a_compiler_refuses(interpreted, tmp_path, ask, refusal):
