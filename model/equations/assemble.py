@@ -10,13 +10,14 @@ import numpy as np
 from ..system.labels import Noise, State, block_of
 from ..system.linear_system import LinearSystem
 from ..system.names import WIND
+from ..vehicle.biases import WIND_BIAS, check_biases
 from ..vehicle.vehicle import Vehicle
 from . import rigid_body
 from .block import Block
 from .control_law import control_law
 from .coupling import Accelerations
 from .deviations import Undeviated, deviated
-from .forces import solved_motion
+from .forces import Handles, solved_motion
 from .motion import Motion
 from .noise import NoiseProcess, deviation_block
 from .outputs import outputs
@@ -38,22 +39,27 @@ def assemble(vehicle: Vehicle, wind_start_covariance: np.ndarray) -> LinearSyste
     Raises
     ------
     DataError
-        If a noise source deviates a table that the mean response cannot carry.
+        If a noise source deviates a table that the mean response cannot carry, or a bias has nothing to act on.
     """
+    check_biases(vehicle)
     numbers = Numbers.of(vehicle)
-    motion, tables, noises = Motion.of(numbers.modes, numbers.tanks), numbers.tables, numbers.noises
-    mean_wind, moved = ca.SX.sym("mean_wind"), ca.SX.sym("moved")
+    motion, tables, deviations = Motion.of(numbers.modes, numbers.tanks), numbers.tables, numbers.deviations
+    mean_wind, handles = ca.SX.sym("mean_wind"), Handles.new()
     wind = wind_block(vehicle.wind.shaping_filter, tables, numbers.sigma_scale)
-    solved = solved_motion(vehicle, numbers, motion, moved)
+    solved = solved_motion(vehicle, numbers, motion, handles)
     control = control_law(numbers, motion, solved)
-    alpha = rigid_body.angle_of_attack(tables, motion.attitude, motion.lateral_velocity, wind.wind + mean_wind)
+    expected = numbers.mean_scale * tables["wind.mean"]
+    met = wind.wind + mean_wind
+    if WIND_BIAS in deviations:
+        met += deviations[WIND_BIAS].deviation * expected
+    alpha = rigid_body.angle_of_attack(tables, motion.attitude, motion.lateral_velocity, met)
     blocks = [
         *_rigid_body(motion, solved),
         *control.blocks,
         *_bending(motion, solved),
         *_slosh(motion, solved, numbers.tanks),
         Block.numbered(WIND, wind.states, wind.derivative),
-        *(deviation_block(name, process) for name, process in noises.items()),
+        *(deviation_block(name, process) for name, process in deviations.items()),
         *_position(vehicle, motion),
     ]
     responses = outputs(vehicle, numbers, motion, solved)
@@ -64,27 +70,28 @@ def assemble(vehicle: Vehicle, wind_start_covariance: np.ndarray) -> LinearSyste
         rates=ca.vertcat(*(block.rates for block in blocks)),
         outputs=ca.vertcat(*(value for _, value in responses)),
         angles=ca.vertcat(alpha, control.engine_angle),
-        moved=moved,
+        responses=tuple(label.name for label, _ in responses),
+        handles=handles,
     )
     derivative, output = deviated(vehicle, numbers, motion, equations)
     return LinearSystem(
         name=vehicle.name,
         time=numbers.time,
         x=x,
-        w=ca.vertcat(wind.white, *(process.white for process in noises.values())),
+        w=ca.vertcat(wind.white, *(process.white for process in deviations.values())),
         u=mean_wind,
         p=numbers.parameters.vector,
         v=tables.vector,
         derivative=derivative,
         output=output,
         states=states,
-        noises=_white_noises(wind.white.numel(), noises),
+        noises=_white_noises(wind.white.numel(), deviations),
         outputs=tuple(label for label, _ in responses),
         parameters=tuple(numbers.parameters.parameters),
         input_names=(WIND,),
-        input_values=numbers.mean_scale * tables["wind.mean"],
+        input_values=expected,
         tables=numbers.groups,
-        start_covariance=_start_covariance(states, wind_start_covariance, noises),
+        start_covariance=_start_covariance(states, wind_start_covariance, deviations),
         discontinuities=vehicle.discontinuities,
         start=vehicle.start,
         end=vehicle.end,
@@ -124,18 +131,18 @@ def _position(vehicle: Vehicle, motion: Motion) -> tuple[Block, ...]:
     return (Block.of("lateral_position", motion.lateral_position, motion.lateral_velocity, "m", scale),)
 
 
-def _white_noises(of_wind: int, noises: Iterable[str]) -> tuple[Noise, ...]:
-    return (*(Noise(f"{WIND}_{i + 1}", WIND) for i in range(of_wind)), *(Noise(name, name) for name in noises))
+def _white_noises(of_wind: int, deviations: Iterable[str]) -> tuple[Noise, ...]:
+    return (*(Noise(f"{WIND}_{i + 1}", WIND) for i in range(of_wind)), *(Noise(name, name) for name in deviations))
 
 
 def _start_covariance(
-    states: Sequence[State], wind: np.ndarray, noises: dict[str, NoiseProcess]
+    states: Sequence[State], wind: np.ndarray, deviations: dict[str, NoiseProcess]
 ) -> dict[str, np.ndarray]:
     """Return the covariance at the start by source: of the wind's filter as given, of a deviation one."""
-    found = {source: np.zeros((len(states), len(states))) for source in (WIND, *noises)}
+    found = {source: np.zeros((len(states), len(states))) for source in (WIND, *deviations)}
     rows = block_of(states, WIND)
     found[WIND][rows, rows] = wind
-    for name, process in noises.items():
+    for name, process in deviations.items():
         for state in deviation_block(name, process).states:
             row = states.index(state)
             found[name][row, row] = 1.0

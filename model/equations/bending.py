@@ -42,6 +42,11 @@ def generalized_force(
     return engine + aerodynamic - mass * (2 * damping * frequency * eta_rate + frequency**2 * eta)
 
 
+def gimbal_displacement(tables: TableSymbols, eta: ca.SX) -> ca.SX:
+    """Return sum_j Y_j(X_E) eta_j, m."""
+    return mode_column(tables, eta.numel(), "displacement_at_gimbal").T @ eta
+
+
 def displacements(tables: TableSymbols, modes: int, tanks: Sequence[str]) -> ca.SX:
     """Return Y_i(X_Sk), shape (modes, tanks)."""
     return _by_tank(tables, modes, tanks, "displacement_at_")

@@ -1,14 +1,17 @@
-"""How deviating tables enter the equations: one column for each noise of a vehicle (4.1.5, 4.1.6)."""
+"""How deviations enter the equations: one column for each noise (4.1.5, 4.1.6) and bias of a vehicle."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import casadi as ca
 
 from ..errors import DataError
-from ..vehicle.noise_loads import CENTER_OF_PRESSURE, loading_noises
+from ..vehicle.biases import CENTER_OF_GRAVITY_OFFSET, THRUST_MISALIGNMENT, vehicle_biases
+from ..vehicle.noise_loads import CENTER_OF_PRESSURE, deviating_tables, loading_deviations
 from ..vehicle.vehicle import Vehicle
+from .forces import Handles
 from .motion import Motion
 from .noise_loads import noise_load
 from .vehicle_numbers import Numbers
@@ -17,7 +20,7 @@ from .vehicle_tables import MEAN_TABLES
 
 @dataclass(frozen=True, eq=False)
 class Undeviated:
-    """The equations before noises: what they act on.
+    """The equations before noises and biases: what they act on.
 
     Attributes
     ----------
@@ -25,19 +28,23 @@ class Undeviated:
         The loads are the first outputs.
     angles : (2,) SX
         Angle of attack and engine angle in terms of the states.
-    moved : SX
-        How far the normal force moves with its centre (m).
+    responses : tuple of str
+        Names of the outputs.
+    handles : Handles
     """
 
     states: ca.SX
     rates: ca.SX
     outputs: ca.SX
     angles: ca.SX
-    moved: ca.SX
+    responses: tuple[str, ...]
+    handles: Handles
 
 
 def deviated(vehicle: Vehicle, numbers: Numbers, motion: Motion, equations: Undeviated) -> tuple[ca.SX, ca.SX]:
-    """Return rates and outputs with every noise added, alpha and beta in terms of the states.
+    """Return rates and outputs with every noise and bias added, alpha and beta in terms of the states.
+
+    The bias of the wind is no column of these: it is in alpha.
 
     Raises
     ------
@@ -45,18 +52,43 @@ def deviated(vehicle: Vehicle, numbers: Numbers, motion: Motion, equations: Unde
         If a noise deviates a table that the mean response cannot carry.
     """
     rates, outputs, n = equations.rates, equations.outputs, equations.states.numel()
-    for name, process in numbers.noises.items():
-        column = deviation_column(vehicle, name, numbers, motion, equations)
-        rates += column[:n] * process.deviation
-        outputs += column[n:] * process.deviation
-    angles = ca.vertcat(motion.alpha, motion.beta, equations.moved)
-    rates, outputs = ca.substitute([rates, outputs], [angles], [ca.vertcat(equations.angles, 0)])
+    for name, column in _columns(vehicle, numbers, motion, equations):
+        deviation = numbers.deviations[name].deviation
+        rates += column[:n] * deviation
+        outputs += column[n:] * deviation
+    handles = equations.handles
+    symbols = ca.vertcat(motion.alpha, motion.beta, handles.vector)
+    rates, outputs = ca.substitute(
+        [rates, outputs], [symbols], [ca.vertcat(equations.angles, handles.values(numbers.tables))]
+    )
     return rates, outputs
 
 
-def deviation_column(vehicle: Vehicle, name: str, numbers: Numbers, motion: Motion, equations: Undeviated) -> ca.SX:
-    """Return d(rates, outputs)/d ln(factor on the tables of a noise) at the mean response, by CasADi's derivative."""
-    tables, deviating = numbers.tables, vehicle.noise[name].tables
+def _columns(vehicle: Vehicle, numbers: Numbers, motion: Motion, equations: Undeviated) -> Iterator[tuple[str, ca.SX]]:
+    """Yield by source what a deviation of 1 puts into rates and outputs."""
+    for name, tables in deviating_tables(vehicle.file).items():
+        yield name, deviation_column(vehicle, name, tables, numbers, motion, equations)
+    both = ca.vertcat(equations.rates, equations.outputs)
+    if THRUST_MISALIGNMENT in numbers.biases:
+        column = ca.jtimes(both, motion.beta, ca.SX(1))
+        column[equations.states.numel() + equations.responses.index("engine_angle")] = 0  # the engines themselves stand
+        yield THRUST_MISALIGNMENT, column
+    if CENTER_OF_GRAVITY_OFFSET in numbers.biases:
+        name, tables = CENTER_OF_GRAVITY_OFFSET, numbers.tables
+        column = ca.jtimes(both, equations.handles.couple, tables["thrust"] - tables["axial_drag"])
+        yield name, column + _direct(vehicle, name, numbers, motion, equations)
+
+
+def deviation_column(
+    vehicle: Vehicle,
+    name: str,
+    deviating: tuple[str, ...],
+    numbers: Numbers,
+    motion: Motion,
+    equations: Undeviated,
+) -> ca.SX:
+    """Return d(rates, outputs)/d ln(factor on deviating tables) at the mean response, by CasADi's derivative."""
+    tables, handles = numbers.tables, equations.handles
     both = ca.vertcat(equations.rates, equations.outputs)
     column = _direct(vehicle, name, numbers, motion, equations)
     for table in deviating:
@@ -70,11 +102,12 @@ def deviation_column(vehicle: Vehicle, name: str, numbers: Numbers, motion: Moti
             )
         column += ca.jtimes(both, symbol, symbol)
         if table == CENTER_OF_PRESSURE:
-            column += ca.jtimes(both, equations.moved, symbol)
+            column += ca.jtimes(both, handles.moved, symbol)
     if column.is_zero():
         raise _refusal(vehicle, name, f"deviations of {', '.join(deviating)} change nothing in the equations")
-    at_mean = ca.vertcat(*(tables[n] for n in MEAN_TABLES), 0)
-    column = ca.substitute(column, ca.vertcat(motion.alpha, motion.beta, motion.attitude, equations.moved), at_mean)
+    at_mean = ca.vertcat(*(tables[n] for n in MEAN_TABLES), 0, 0)
+    symbols = ca.vertcat(motion.alpha, motion.beta, motion.attitude, handles.moved, handles.couple)
+    column = ca.substitute(column, symbols, at_mean)
     if ca.depends_on(column, equations.states):
         raise _refusal(
             vehicle,
@@ -86,8 +119,8 @@ def deviation_column(vehicle: Vehicle, name: str, numbers: Numbers, motion: Moti
 
 
 def _direct(vehicle: Vehicle, name: str, numbers: Numbers, motion: Motion, equations: Undeviated) -> ca.SX:
-    """Return what a noise puts into the loads by coefficients that follow its tables, zero in all other rows."""
-    loading, form = loading_noises(vehicle.file).get(name, ()), vehicle.file.options.noise_loads
+    """Return what a deviation puts into the loads by coefficients that follow it, zero in all other rows."""
+    loading, form = loading_deviations(vehicle.file).get(name, ()), vehicle.file.options.noise_loads
     n = equations.states.numel()
     column = ca.SX.zeros(n + equations.outputs.numel())
     for k, load in enumerate(vehicle.file.loads):
@@ -97,4 +130,6 @@ def _direct(vehicle: Vehicle, name: str, numbers: Numbers, motion: Motion, equat
 
 
 def _refusal(vehicle: Vehicle, name: str, why: str) -> DataError:
-    return DataError(why, file=vehicle.folder / "vehicle.toml", column=f"noise.{name}.tables")
+    biases = vehicle_biases(vehicle.file)
+    column = f"biases.{biases[name].key}" if name in biases else f"noise.{name}.tables"
+    return DataError(why, file=vehicle.folder / "vehicle.toml", column=column)

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import casadi as ca
 
+from ..system.symbols import TableSymbols
+from ..vehicle.biases import CENTER_OF_GRAVITY_OFFSET
 from ..vehicle.columns import MOVED_MODE
 from ..vehicle.noise_loads import needed_columns
 from ..vehicle.vehicle import Vehicle
@@ -15,16 +19,47 @@ from .noise_loads import moved_modal_force
 from .vehicle_numbers import Numbers
 
 
-def solved_motion(vehicle: Vehicle, numbers: Numbers, motion: Motion, moved: ca.SX) -> Accelerations:
+@dataclass(frozen=True, eq=False)
+class Handles:
+    """Symbols by which deviations take hold of the forces; in the equations themselves they have a value.
+
+    Attributes
+    ----------
+    moved : SX
+        Metres that the normal force moves forward: zero.
+    couple : SX
+        Couple on the whole vehicle (N m): zero.
+    bent_thrust : SX
+        Thrust on the displaced gimbal (N): the table, whose deviations it does not follow.
+    """
+
+    moved: ca.SX
+    couple: ca.SX
+    bent_thrust: ca.SX
+
+    @staticmethod
+    def new() -> Handles:
+        """Declare the symbols."""
+        return Handles(*(ca.SX.sym(name) for name in ("moved", "couple", "bent_thrust")))
+
+    @property
+    def vector(self) -> ca.SX:
+        return ca.vertcat(self.moved, self.couple, self.bent_thrust)
+
+    @staticmethod
+    def values(tables: TableSymbols) -> ca.SX:
+        """Return what stands in their place."""
+        return ca.vertcat(0, 0, tables["thrust"])
+
+
+def solved_motion(vehicle: Vehicle, numbers: Numbers, motion: Motion, handles: Handles) -> Accelerations:
     """Return Y'', phi_Z'', eta'' and xi'' (4-1, 4-2, 4-8, 4-11, 4-12).
 
     Parameters
     ----------
     vehicle : Vehicle
-    numbers, motion
+    numbers, motion, handles
         The vehicle's symbols.
-    moved : SX
-        Metres that the normal force moves forward, a deviation: zero in the equations themselves.
     """
     options, tables, tanks, modes = vehicle.file.options, numbers.tables, numbers.tanks, numbers.modes
     area, alpha, beta, attitude = numbers.area, motion.alpha, motion.beta, motion.attitude
@@ -34,9 +69,13 @@ def solved_motion(vehicle: Vehicle, numbers: Numbers, motion: Motion, moved: ca.
     moment = rigid_body.yaw_moment(tables, area, alpha, beta)
     if options.full_coupling:
         moment += tables["axial_acceleration"] * ca.sum1(slosh_mass * motion.xi)
+    if options.p_delta:
+        moment -= handles.bent_thrust * bending.gimbal_displacement(tables, eta)
+    if CENTER_OF_GRAVITY_OFFSET in numbers.biases:
+        moment += handles.couple
     modal_force = bending.generalized_force(tables, area, numbers.bending_damping, eta, eta_rate, alpha, beta)
     if MOVED_MODE in needed_columns(vehicle.file)[1]:
-        modal_force += moved_modal_force(tables, area, modes, alpha) * moved
+        modal_force += moved_modal_force(tables, area, modes, alpha) * handles.moved
     if options.local_angle_of_attack:
         local = local_forces(tables, area, motion.attitude_rate, eta, eta_rate)
         force, moment, modal_force = force + local.force, moment + local.moment, modal_force + local.modal

@@ -7,15 +7,19 @@ from collections.abc import Iterable, Mapping, Sequence
 import casadi as ca
 
 from ..system.labels import Output
+from ..vehicle.biases import CENTER_OF_GRAVITY_OFFSET, THRUST_MISALIGNMENT
 from .coupling import Accelerations
 from .motion import Motion
 from .typical_sizes import SCALES
 
+# unit and typical size of deviations that are not relative
+IN_PLACE_UNITS = {CENTER_OF_GRAVITY_OFFSET: ("m", "offset"), THRUST_MISALIGNMENT: ("rad", "angle")}
 
-def component_columns(modes: int, tanks: Sequence[str], noises: Iterable[str] = ()) -> dict[str, str]:
+
+def component_columns(modes: int, tanks: Sequence[str], deviations: Iterable[str] = ()) -> dict[str, str]:
     """Return the outputs that a moment is made of and the column of a load's table that multiplies each.
 
-    The columns of slosh_reaction have no output of their own: they act through the tanks. ``noises`` are those that
+    The columns of slosh_reaction have no output of their own: they act through the tanks. ``deviations`` are those that
     load stations by themselves.
     """
     numbers = range(1, modes + 1)
@@ -28,7 +32,7 @@ def component_columns(modes: int, tanks: Sequence[str], noises: Iterable[str] = 
         **{f"bending_displacement_{i}": f"bending_displacement_{i}" for i in numbers},
         **{f"bending_rate_{i}": f"bending_rate_{i}" for i in numbers},
         **{f"slosh_displacement_{tank}": f"slosh_displacement_{tank}" for tank in tanks},
-        **{f"relative_deviation_{name}": f"relative_deviation_{name}" for name in noises},
+        **{deviation_output(name): deviation_output(name) for name in deviations},
     }
 
 
@@ -52,6 +56,11 @@ def load_components(
             (Output(f"slosh_displacement_{tank}", "m", SCALES["slosh"], f"xi of {tank}"), motion.xi[k]),
         ]  # fmt: skip
     for name, deviation in deviations.items():
-        output = Output(f"relative_deviation_{name}", "1", SCALES["relative_deviation"], f"n of {name}")
-        found.append((output, deviation))
+        unit, scale = IN_PLACE_UNITS.get(name, ("1", "relative_deviation"))
+        found.append((Output(deviation_output(name), unit, SCALES[scale], f"n of {name}"), deviation))
     return found
+
+
+def deviation_output(name: str) -> str:
+    """Return what the output of a deviation is called: a length or an angle as its source."""
+    return name if name in IN_PLACE_UNITS else f"relative_deviation_{name}"

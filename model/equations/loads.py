@@ -45,6 +45,17 @@ def bending_moment(
     return moment
 
 
+def bent_axis_moment(tables: TableSymbols, output: str, eta: ca.SX) -> ca.SX:
+    """What thrust on the displaced gimbal adds to 4-13, N m: F_TX / m sum_j (p_delta_j) eta_j.
+
+    The forces along the axis pull at the bent axis forward of the station, less the answer of the rigid body to the
+    couple -F_TX sum_j Y_j(X_E) eta_j; drag is spread as the mass.
+    """
+    coefficients = tables.under(f"loads.{output}.")
+    columns = ca.vertcat(ca.SX(0, 1), *(coefficients[f"p_delta_{i + 1}"] for i in range(eta.numel())))
+    return tables["thrust"] / tables["mass"] * ca.dot(columns, eta)
+
+
 def tanks_forward(vehicle: Vehicle, load: LoadEntry, time: ca.SX, parameters: ParameterSymbols) -> ca.SX:
     """Return 1 where a tank's slosh mass is forward of a load station and 0 where it is aft, shape (tanks,).
 

@@ -8,6 +8,8 @@ deviation is sigma times a first-order Gauss-Markov process of unit variance,
     n' = -n / tau + sqrt(2 / tau) w,
 
 or, as an option, sigma times white noise of unit intensity.
+
+A bias is sigma times a constant of unit variance, n' = 0: the flight's, random from flight to flight.
 """
 
 from __future__ import annotations
@@ -17,6 +19,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from ..system.symbols import ParameterSymbols
+from ..vehicle.biases import Bias
 from ..vehicle.vehicle_file import NoiseEntry
 from .block import Block
 
@@ -25,7 +28,7 @@ DEVIATION = "deviation"  # the block of their states
 
 @dataclass(frozen=True)
 class NoiseProcess:
-    """A relative deviation: its states (none or one), their derivative, and the deviation itself."""
+    """A deviation: its states (none or one), their derivative, and the deviation itself, in its unit."""
 
     state: ca.SX
     derivative: ca.SX
@@ -48,3 +51,14 @@ def noise_process(name: str, entry: NoiseEntry, parameters: ParameterSymbols) ->
     tau = parameters.add(f"{name}.correlation_time", entry.correlation_time_s, "s", f"correlation time of {name}")
     state = ca.SX.sym(f"deviation_{name}")
     return NoiseProcess(state, -state / tau + ca.sqrt(2 / tau) * white, white, sigma * state)
+
+
+def bias_process(bias: Bias, parameters: ParameterSymbols) -> NoiseProcess:
+    """Declare the parameter of a bias and return its process.
+
+    Sources are known by their white noises; that of a bias enters nothing.
+    """
+    meaning = f"one sigma of {bias.source}, constant over a flight"
+    sigma = parameters.add(f"{bias.source}.standard_deviation", bias.standard_deviation, bias.unit, meaning)
+    state = ca.SX.sym(f"{DEVIATION}_{bias.source}")
+    return NoiseProcess(state, ca.SX.zeros(1), ca.SX.sym(f"white_{bias.source}"), sigma * state)

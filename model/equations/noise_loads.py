@@ -1,4 +1,4 @@
-"""What a deviating force puts into the bending moment itself (docs/equations.md, section 4)."""
+"""What a deviation puts into the bending moment itself (docs/equations.md, section 4)."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from typing import Any
 import casadi as ca
 
 from ..system.symbols import TableSymbols
-from ..vehicle.columns import MOVED_LINE, MOVED_MODE, SECOND_MOMENT
+from ..vehicle.biases import CENTER_OF_GRAVITY_OFFSET, THRUST_MISALIGNMENT
+from ..vehicle.columns import MOVED_LINE, MOVED_MODE, OFFSET_MASS, SECOND_MOMENT
 from ..vehicle.noise_loads import CENTER_OF_PRESSURE, COEFFICIENTS
 from ..vehicle.vehicle_file import NoiseLoads
 from .bending import mode_column
@@ -28,12 +29,12 @@ def noise_load(
     alpha: Any,
     beta: Any,
 ) -> Any:
-    """Return the moment (N m) for a relative deviation of 1 of all these tables, by symbols or by numbers.
+    """Return the moment (N m) for a deviation of 1 of all these, by symbols or by numbers.
 
     Parameters
     ----------
     tables : iterable of str
-        As ``loading_noises`` gives them.
+        As ``loading_deviations`` gives them.
     form : str
     coefficients : mapping
         Columns of the load's table.
@@ -47,6 +48,10 @@ def noise_load(
         if table in COEFFICIENTS:
             coefficient = COEFFICIENTS[table]
             moment = moment + coefficients[coefficient] * angles[coefficient]
+        elif table == THRUST_MISALIGNMENT:
+            moment = moment + coefficients["engine_angle"]
+        elif table == CENTER_OF_GRAVITY_OFFSET:
+            moment = moment + coefficients[OFFSET_MASS.name] * flight["axial_acceleration"]
         else:
             metre = _load_of_a_metre(form, coefficients, flight, reference_area)
             moment = moment + metre * flight[CENTER_OF_PRESSURE] * alpha

@@ -7,12 +7,12 @@ from collections.abc import Iterable
 import casadi as ca
 
 from ..system.labels import Output
-from ..vehicle.noise_loads import loading_noises
+from ..vehicle.noise_loads import loading_deviations
 from ..vehicle.vehicle import Vehicle
 from ..vehicle.vehicle_file import ExtraOutput, LoadEntry
 from .coupling import Accelerations
 from .load_components import load_components
-from .loads import bending_moment, slosh_reaction, tanks_forward, typical_moment
+from .loads import bending_moment, bent_axis_moment, slosh_reaction, tanks_forward, typical_moment
 from .local_aerodynamics import local_bending_moment
 from .motion import Motion
 from .typical_sizes import SCALES
@@ -27,7 +27,7 @@ def outputs(vehicle: Vehicle, numbers: Numbers, motion: Motion, solved: Accelera
     found.append((Output("angle_of_attack", "rad", SCALES["angle"], "alpha"), motion.alpha))
     found.append((Output("engine_angle", "rad", SCALES["angle"], "beta"), motion.beta))
     for extra in dict.fromkeys(vehicle.file.options.extra_outputs):
-        found += _extra(extra, loading_noises(vehicle.file), numbers, motion, solved)
+        found += _extra(extra, loading_deviations(vehicle.file), numbers, motion, solved)
     return found
 
 
@@ -39,6 +39,8 @@ def _load(vehicle: Vehicle, load: LoadEntry, numbers: Numbers, motion: Motion, s
     if options.slosh_reaction:
         forward = tanks_forward(vehicle, load, numbers.time, numbers.parameters)
         moment += slosh_reaction(tables, load.output, tanks, forward, motion.xi, solved.slosh)
+    if options.p_delta:
+        moment += bent_axis_moment(tables, load.output, motion.eta)
     scale = typical_moment(vehicle.tables[f"loads.{load.output}.angle_of_attack"])
     return Output(load.output, "N m", scale, f"B.M. at station {load.station_m:g} m"), moment
 
@@ -51,5 +53,5 @@ def _extra(
     if extra == "drift_rate":
         return [(Output(extra, "m/s", SCALES["lateral_velocity"], "Y'"), motion.lateral_velocity)]
     if extra == "load_components":
-        return load_components(motion, solved, numbers.tanks, {n: numbers.noises[n].deviation for n in loading})
+        return load_components(motion, solved, numbers.tanks, {n: numbers.deviations[n].deviation for n in loading})
     return [(Output(extra, "Pa rad", SCALES[extra], "q alpha"), numbers.tables["dynamic_pressure"] * motion.alpha)]

@@ -13,7 +13,7 @@ from ..errors import DataError, PlausibilityWarning
 from ..files.csv_table import read_csv_table
 from ..files.folder_files import file_inside
 from ..tables import Table
-from ..vehicle.columns import ALONG_ARGUMENTS, MOVED_LINE, TIME, Column, along_columns
+from ..vehicle.columns import ALONG_ARGUMENTS, MOVED_LINE, OFFSET_MASS, TIME, Column, along_columns, p_delta_columns
 from ..vehicle.noise_loads import needed_columns
 from ..vehicle.vehicle import Vehicle
 
@@ -74,8 +74,9 @@ def load_station_loads(vehicle: Vehicle) -> StationLoads:
     file: Path = file_inside(vehicle.folder, entry.file)
     csv = read_csv_table(file, TIME.name, TIME.unit, order="not decreasing")
     columns = along_columns(len(vehicle.bending), [tank.name for tank in vehicle.slosh])
-    if MOVED_LINE not in needed_columns(vehicle.file)[0]:
-        columns = tuple(column for column in columns if column != MOVED_LINE)
+    by_need = (MOVED_LINE, OFFSET_MASS, *p_delta_columns(len(vehicle.bending)))
+    needed = needed_columns(vehicle.file)[0]
+    columns = tuple(column for column in columns if column in needed or column not in by_need)
     for column in (*ALONG_ARGUMENTS, *columns):
         csv.column(column.name, column.unit)
     time, station = csv.columns["time"], csv.columns["station"]

@@ -5,15 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..tables import TableGroup
+from ..vehicle.biases import vehicle_biases
+from ..vehicle.noise_loads import deviating_tables
 from ..vehicle.vehicle import Vehicle
 
 
 def structure_in_words(vehicle: Vehicle, states: int, groups: Sequence[TableGroup]) -> dict[str, str]:
     """Return it by what is counted or chosen; ``states`` is their number."""
+    file, biases = vehicle.file, ", ".join(vehicle_biases(vehicle.file))
     orders = (f"{n} {len(e.denominator) - 1}" for n, e in vehicle.transfer_functions.items())
-    relief = ", ".join(
-        f"{n} of order {len(e.filter.denominator) - 1}" for n, e in vehicle.file.control.load_relief.items()
-    )
+    relief = ", ".join(f"{n} of order {len(e.filter.denominator) - 1}" for n, e in file.control.load_relief.items())
     return {
         **({"load relief": relief} if relief else {}),
         "bending modes": str(len(vehicle.bending)),
@@ -21,12 +22,14 @@ def structure_in_words(vehicle: Vehicle, states: int, groups: Sequence[TableGrou
         "transfer function orders": ", ".join(orders),
         "wind filter": f"order {vehicle.wind.shaping_filter.order}, {vehicle.wind.shaping_filter.noise_count} noises",
         "noise sources": ", ".join(f"{n} ({'white' if e.white else 'coloured'})" for n, e in vehicle.noise.items()),
-        "loads": ", ".join(load.output for load in vehicle.file.loads),
-        "extra outputs": ", ".join(vehicle.file.options.extra_outputs) or "none",
-        "full coupling": str(vehicle.file.options.full_coupling).lower(),
-        **({"local angle of attack": "true"} if vehicle.file.options.local_angle_of_attack else {}),
-        **({"slosh reaction": "true"} if vehicle.file.options.slosh_reaction else {}),
-        **({"noise loads": vehicle.file.options.noise_loads} if vehicle.noise and vehicle.file.loads else {}),
+        "loads": ", ".join(load.output for load in file.loads),
+        "extra outputs": ", ".join(file.options.extra_outputs) or "none",
+        "full coupling": str(file.options.full_coupling).lower(),
+        **({"local angle of attack": "true"} if file.options.local_angle_of_attack else {}),
+        **({"slosh reaction": "true"} if file.options.slosh_reaction else {}),
+        **({"noise loads": file.options.noise_loads} if deviating_tables(file) and file.loads else {}),
+        **({"biases": biases} if biases else {}),
+        **({"P-delta": "true"} if file.options.p_delta else {}),
         "states": str(states),
         "table lengths": ", ".join(f"{g.name} {len(g.names)} x {g.knots.size}" for g in groups),
     }

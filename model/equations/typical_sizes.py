@@ -14,4 +14,5 @@ SCALES = {
     "bending_acceleration": 3.0,
     "slosh_acceleration": 3.0,
     "relative_deviation": 0.01,
+    "offset": 0.01,
 }

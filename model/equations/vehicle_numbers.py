@@ -9,10 +9,11 @@ import casadi as ca
 
 from ..system.symbols import ParameterSymbols, TableSymbols
 from ..tables import TableGroup
+from ..vehicle.biases import vehicle_biases
 from ..vehicle.vehicle import Vehicle
 from .control import transfer_function_symbols
 from .load_relief import Sensor, sensor_symbols
-from .noise import NoiseProcess, noise_process
+from .noise import NoiseProcess, bias_process, noise_process
 from .vehicle_tables import vehicle_tables
 
 
@@ -34,7 +35,8 @@ class Numbers:
     networks : dict of str to (gain, numerator, denominator)
         T1, T2, T3.
     bending_damping, slosh_damping : (modes,) and (tanks,) SX
-    noises : dict of str to NoiseProcess
+    noises, biases : dict of str to NoiseProcess
+        By source.
     sigma_scale, mean_scale : SX
         Factors on the wind's standard deviation and mean.
     sensors : dict of str to Sensor
@@ -52,9 +54,15 @@ class Numbers:
     bending_damping: ca.SX
     slosh_damping: ca.SX
     noises: dict[str, NoiseProcess]
+    biases: dict[str, NoiseProcess]
     sigma_scale: ca.SX
     mean_scale: ca.SX
     sensors: dict[str, Sensor]
+
+    @property
+    def deviations(self) -> dict[str, NoiseProcess]:
+        """Noises and biases of the vehicle, by source."""
+        return self.noises | self.biases
 
     @staticmethod
     def of(vehicle: Vehicle) -> Numbers:
@@ -80,6 +88,7 @@ class Numbers:
                 for t in vehicle.slosh
             ),
             noises={n: noise_process(n, e, parameters) for n, e in vehicle.noise.items()},
+            biases={n: bias_process(b, parameters) for n, b in vehicle_biases(vehicle.file).items()},
             sigma_scale=parameters.add("wind.sigma_scale", 1.0, "1", "factor on the wind's standard deviation"),
             mean_scale=parameters.add("wind.mean_scale", 1.0, "1", "factor on the mean wind"),
             sensors=sensor_symbols(vehicle.file.control.load_relief, modes, tables, parameters),

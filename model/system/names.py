@@ -25,6 +25,8 @@ RESPONSE_NAMES = {
     "angle_of_attack": "a response of every vehicle",
     "engine_angle": "a response of every vehicle",
     "lateral_drift|drift_rate|dynamic_pressure_times_angle_of_attack": "one of options.extra_outputs",
+    "relative_deviation_.*|center_of_gravity_offset|thrust_misalignment": "a deviation among the load_components of "
+    "options.extra_outputs",
     r"attitude_rate|bending_(acceleration|displacement|rate)_\d+|slosh_(acceleration|displacement)_.*": "one of the "
     "load_components of options.extra_outputs",
     "statistics|weighting_functions|bending_moment_along_vehicle": "a file of the results",

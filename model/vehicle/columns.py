@@ -77,6 +77,22 @@ MOVED_MODE = Column(
     "normal_force_slope_times_slope", "1/m/rad", "", "what each metre of that move adds to the air force on the mode"
 )
 
+# of a load, where the centre of gravity lies beside the thrust
+OFFSET_MASS = Column(
+    "center_of_gravity_offset",
+    "kg",
+    "",
+    "mass forward of s less S_2 mass / I_ZZ: moment for each m of offset and m/s2 along the axis",
+)
+
+
+def p_delta_columns(modes: int) -> tuple[Column, ...]:
+    """Return the columns of a load for thrust on the displaced gimbal."""
+    return tuple(
+        Column(f"p_delta_{i}", "kg", "", f"moment for each m of mode {i} and m/s2 of thrust over mass")
+        for i in range(1, modes + 1)
+    )
+
 
 def bending_columns(tanks: Sequence[str]) -> tuple[Column, ...]:
     """Return the columns of a bending mode."""
@@ -159,4 +175,7 @@ ALONG_ARGUMENTS = (
 
 def along_columns(modes: int, tanks: Sequence[str]) -> tuple[Column, ...]:
     """Return the coefficient columns of the loads along the vehicle."""
-    return (*load_columns(modes, tanks), *REACTION, MOVED_LINE, *local_load_columns(modes))
+    return (
+        *load_columns(modes, tanks), *REACTION, MOVED_LINE, OFFSET_MASS, *p_delta_columns(modes),
+        *local_load_columns(modes),
+    )  # fmt: skip

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import TypeVar
 
 from ..system.names import NOISE_NAMES, RESPONSE_NAMES, TANK_NAMES, taken_by
+from .biases import vehicle_biases
 from .vehicle_file import TableEntry, VehicleFile
 
 Item = TypeVar("Item")
@@ -16,6 +17,9 @@ def name_faults(file: VehicleFile) -> Iterator[tuple[str, str]]:
     for name in file.noise:
         if who := taken_by(name, NOISE_NAMES):
             yield f"noise.{name}", f"is called as {who}; rename it"
+    for bias in vehicle_biases(file).values():
+        if bias.source in file.noise:
+            yield f"noise.{bias.source}", f"is called as the source of biases.{bias.key}; rename it"
     for i, tank in enumerate(file.slosh):
         if who := taken_by(tank.name, TANK_NAMES):
             yield f"slosh.{i}.name", f"'{tank.name}' is taken by {who}; rename the tank"

@@ -1,4 +1,4 @@
-"""What a deviating force puts into the bending moment itself: 4-13 in equilibrium for every noise.
+"""What a deviating force puts into the bending moment itself: 4-13 in equilibrium for every noise and bias.
 
 4-13 holds M'_alpha alpha and M'_beta beta at their nominal coefficients. A force that deviates by df loads a station by
 itself too, less the inertia with which the whole vehicle answers it as a rigid body,
@@ -14,6 +14,9 @@ turns the vehicle by the couple C dX, C = q A C'_N alpha, and where that couple 
     couple_forward  wholly forward of the station: (1 - S_2 / I_ZZ) C
     couple_aft      wholly aft of it: -S_2 / I_ZZ C
     as_reported     no deviation enters 4-13 itself, as in the report
+
+A thrust that points beside the engine's direction loads a station as the engine angle does, by M'_beta. Masses that
+lie beside the thrust axis by e pull there with -A_X mu per length: e A_X (mass forward of s - S_2 / I_ZZ mass).
 """
 
 from __future__ import annotations
@@ -25,7 +28,8 @@ from typing import get_args
 from ..errors import AscentwindWarning, DataError
 from ..files.csv_table import read_csv_table
 from ..files.folder_files import file_inside
-from .columns import MOVED_LINE, MOVED_MODE, SECOND_MOMENT, Column
+from .biases import CENTER_OF_GRAVITY_OFFSET, THRUST_MISALIGNMENT, vehicle_biases
+from .columns import MOVED_LINE, MOVED_MODE, OFFSET_MASS, SECOND_MOMENT, Column, p_delta_columns
 from .vehicle_file import NoiseLoads, VehicleFile
 
 NOISE_LOADS: tuple[NoiseLoads, ...] = get_args(NoiseLoads)
@@ -36,6 +40,7 @@ COEFFICIENTS = {  # column of a load's table that a deviating table multiplies
     "normal_force_slope": "angle_of_attack",
 }
 CENTER_OF_PRESSURE = "center_of_pressure"
+IN_PLACE = (CENTER_OF_GRAVITY_OFFSET, THRUST_MISALIGNMENT)  # biases that deviate no table
 MASSES_IN_PLACE = ("center_of_gravity", "attach_point")  # a load's table cannot tell which masses move with these
 
 
@@ -43,20 +48,40 @@ class NoiseLoadsWarning(AscentwindWarning):
     """A vehicle's tables lack what a noise needs, and a form that does without was taken."""
 
 
-def loading_noises(file: VehicleFile) -> dict[str, tuple[str, ...]]:
-    """Return the noises that load stations by themselves and their tables that do."""
-    if file.options.noise_loads == "as_reported":
-        return {}
-    forces = {*COEFFICIENTS, CENTER_OF_PRESSURE}
-    found = {name: tuple(t for t in noise.tables if t in forces) for name, noise in file.noise.items()}
-    return {name: tables for name, tables in found.items() if tables}
+def deviating_tables(file: VehicleFile) -> dict[str, tuple[str, ...]]:
+    """Return the noises and biases that deviate tables, and which."""
+    biases = {name: bias.tables for name, bias in vehicle_biases(file).items() if bias.tables}
+    return {name: noise.tables for name, noise in file.noise.items()} | biases
+
+
+def loading_deviations(file: VehicleFile) -> dict[str, tuple[str, ...]]:
+    """Return the noises and biases that load stations by themselves and what of them does: tables, or the bias."""
+    forces = () if file.options.noise_loads == "as_reported" else (*COEFFICIENTS, CENTER_OF_PRESSURE)
+    found = {name: tuple(t for t in tables if t in forces) for name, tables in deviating_tables(file).items()}
+    of_axis = {name: (name,) for name in vehicle_biases(file) if name in IN_PLACE}
+    return {name: tables for name, tables in found.items() if tables} | of_axis
 
 
 def needed_columns(file: VehicleFile) -> tuple[tuple[Column, ...], tuple[Column, ...]]:
-    """Return the columns that noises need in the tables of the loads and in those of the modes."""
-    if not any(CENTER_OF_PRESSURE in tables for tables in loading_noises(file).values()):
+    """Return the columns that deviations and P-delta need in the tables of the loads and in those of the modes."""
+    loading = loading_deviations(file)
+    of_loads, of_modes = _moved_columns(file)
+    if CENTER_OF_GRAVITY_OFFSET in loading:
+        of_loads += (OFFSET_MASS,)
+    if file.options.p_delta:
+        of_loads += p_delta_columns(len(file.bending))
+    return of_loads, of_modes
+
+
+def _moved_columns(file: VehicleFile) -> tuple[tuple[Column, ...], tuple[Column, ...]]:
+    if not any(CENTER_OF_PRESSURE in tables for tables in loading_deviations(file).values()):
         return (), ()
     return ((MOVED_LINE,), (MOVED_MODE,)) if file.options.noise_loads == "moved_line" else ((SECOND_MOMENT,), ())
+
+
+def form_is_open(file: VehicleFile) -> bool:
+    """Return whether the file leaves it to its tables what a moved centre of pressure does to the loads."""
+    return "noise_loads" not in file.options.model_fields_set and any(_moved_columns(file))
 
 
 def form_of_tables(folder: Path, toml: Path, file: VehicleFile) -> tuple[NoiseLoads, NoiseLoadsWarning | None]:

@@ -26,6 +26,7 @@ from .columns import (
     GAINS,
     MOVED_LINE,
     MOVED_MODE,
+    OFFSET_MASS,
     PREFIX,
     PROPULSION,
     REACTION,
@@ -41,10 +42,11 @@ from .columns import (
     local_columns,
     local_load_columns,
     mode_columns,
+    p_delta_columns,
 )
 from .coverage import check_schedule, check_wind, loaded_flight
 from .names import name_faults
-from .noise_loads import check_noises, form_of_tables, needed_columns
+from .noise_loads import check_noises, form_is_open, form_of_tables, needed_columns
 from .plausibility import check_plausibility
 from .shipped import VEHICLE_FILE
 from .vehicle import TableSource, Vehicle
@@ -111,7 +113,7 @@ def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehi
                     column=f"loads.{load.output}.forward_of_gimbal_m",
                 )
             columns |= dict.fromkeys(REACTION)
-        unused = (*REACTION, MOVED_LINE)
+        unused = (*REACTION, MOVED_LINE, OFFSET_MASS, *p_delta_columns(len(file.bending)))
         reader.add(f"loads.{load.output}", load.table, tuple(columns), f"loads.{load.output}.", unused)
     if file.options.local_angle_of_attack:
         _add_local(reader, file)
@@ -162,7 +164,7 @@ def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehi
 def _with_noise_loads(file: VehicleFile, folder: Path, toml: Path) -> VehicleFile:
     """Check what noises do to the loads; where the file leaves it open, take the form that its tables allow."""
     check_noises(file, toml)
-    if "noise_loads" in file.options.model_fields_set or not any(needed_columns(file)):
+    if not form_is_open(file):
         return file
     form, warning = form_of_tables(folder, toml, file)
     if warning is not None:

@@ -11,6 +11,7 @@ def table_columns(file: VehicleFile) -> dict[str, tuple[Column, ...]]:
     """Return by file name every column that a table of a vehicle has a use for, its argument first."""
     modes, tanks = len(file.bending), [tank.name for tank in file.slosh]
     tables, control = file.tables, file.control
+    by_option = (*c.REACTION, c.MOVED_LINE, c.OFFSET_MASS, *c.p_delta_columns(modes))
     found = {
         tables.rigid_body.file: c.RIGID_BODY,
         tables.trajectory.file: c.TRAJECTORY,
@@ -19,7 +20,7 @@ def table_columns(file: VehicleFile) -> dict[str, tuple[Column, ...]]:
         control.gains.file: c.GAINS,
         **{mode.table.file: (*c.bending_columns(tanks), c.MOVED_MODE) for mode in file.bending},
         **{tank.table.file: c.SLOSH for tank in file.slosh},
-        **{load.table.file: (*c.load_columns(modes, tanks), *c.REACTION, c.MOVED_LINE) for load in file.loads},
+        **{load.table.file: (*c.load_columns(modes, tanks), *by_option) for load in file.loads},
         **{load.local.file: c.local_load_columns(modes) for load in file.loads if load.local},
         **{sensor.modes.file: c.mode_columns(modes) for sensor in control.load_relief.values() if sensor.modes},
         **{sensor.schedule.file: c.SCHEDULE for sensor in control.load_relief.values() if sensor.schedule},

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from ..files.folder_files import FileName
 from ..files.toml_file import Name, NotNegative, Positive, Section, read_toml
@@ -14,6 +14,15 @@ from ..files.toml_file import Name, NotNegative, Positive, Section, read_toml
 ExtraOutput = Literal["lateral_drift", "drift_rate", "dynamic_pressure_times_angle_of_attack", "load_components"]
 STRUCTURE = "structure"  # marks keys that change the equations, not numbers in them
 NoiseLoads = Literal["moved_line", "couple_forward", "couple_aft", "as_reported"]
+
+
+def _with_spread(value: Any) -> Any:
+    if isinstance(value, int | float) and value == 0:
+        raise ValueError("leaves the bias without spread, which is no bias; remove its section or give its sigma")
+    return value
+
+
+Spread = Annotated[float, BeforeValidator(_with_spread), Field(gt=0)]  # one sigma of a bias
 
 
 class TableEntry(Section):
@@ -113,6 +122,37 @@ class NoiseEntry(Section):
     source: str = ""
 
 
+class RelativeBiasEntry(Section):
+    """A relative error that is constant over a flight."""
+
+    standard_deviation: Spread
+    source: str = ""
+
+
+class LengthBiasEntry(Section):
+    """A length that is constant over a flight."""
+
+    standard_deviation_m: Spread
+    source: str = ""
+
+
+class AngleBiasEntry(Section):
+    """An angle that is constant over a flight."""
+
+    standard_deviation_deg: Spread
+    source: str = ""
+
+
+class BiasesEntry(Section):
+    """What is constant over a flight and random from flight to flight; see model/vehicle/biases.py."""
+
+    thrust: RelativeBiasEntry | None = None
+    center_of_pressure: RelativeBiasEntry | None = None
+    center_of_gravity_offset: LengthBiasEntry | None = None
+    thrust_misalignment: AngleBiasEntry | None = None
+    wind: RelativeBiasEntry | None = None
+
+
 class Profile(Section):
     """Knots over altitude."""
 
@@ -197,6 +237,7 @@ class OptionsEntry(Section):
     full_coupling: bool = False
     local_angle_of_attack: bool = False
     slosh_reaction: bool = False
+    p_delta: bool = False
     noise_loads: NoiseLoads = "moved_line"
     mean_response: Literal["linear", "nonlinear"] = "linear"
     extra_outputs: tuple[ExtraOutput, ...] = ()
@@ -229,6 +270,7 @@ class VehicleFile(Section):
     slosh: Annotated[tuple[SloshEntry, ...], STRUCTURE] = ()
     loads: Annotated[tuple[LoadEntry, ...], STRUCTURE] = ()
     noise: Annotated[dict[Name, NoiseEntry], STRUCTURE] = Field(default_factory=dict)
+    biases: Annotated[BiasesEntry, STRUCTURE] = BiasesEntry()
     wind: WindEntry
     options: Annotated[OptionsEntry, STRUCTURE] = OptionsEntry()
 

@@ -55,6 +55,13 @@ class Line:
         share = (self.points - x[left]) / (x[left + 1] - x[left])
         return values[..., left] * (1 - share) + values[..., left + 1] * share
 
+    def at(self, values: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return at any points, (..., k), what ``linear`` gave as values (..., 2 m)."""
+        element = np.clip(np.searchsorted(self.edges, points, side="right") - 1, 0, self.edges.size - 2)
+        low, high = self.points[2 * element], self.points[2 * element + 1]
+        share = (points - low) / (high - low)
+        return values[..., 2 * element] * (1 - share) + values[..., 2 * element + 1] * share
+
     def slope(self, x: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the slope at the points, (..., 2 m), of what ``linear`` gives."""
         left = np.clip(np.searchsorted(x, self.points) - 1, 0, x.size - 2)

@@ -12,6 +12,10 @@ rotary inertia per length. At either end L vanishes whatever f is. Coefficients 
 M'_beta = L of the control thrust at the gimbal plane, M'_eta = -int (x - s) mu Y + r Y' dx (modes are orthogonal to
 rigid motion: nothing answers), M'_xi = -m_k (X_S - s) forward of s. The normal force moved forward as a whole by a
 metre gives dM'_alpha/dX_CP = L[-q A dc'_N/dx] = N(s) - S_2 / I N, by parts, N(s) being what acts forward of s.
+
+Forces along the axis load a station where masses or the axis lie beside it. A mass e beside the thrust axis pulls with
+-A_X mu there: e A_X [int mu dx - S_2 m / I]. On an axis bent by Y the inertia -a mu and the thrust m a at the gimbal
+(a = F_TX / m, drag spread as the mass) make a [int mu (Y - Y(s)) dx + S_2 m Y(0) / I], less m (Y(0) - Y(s)) aft of it.
 """
 
 from __future__ import annotations
@@ -74,6 +78,10 @@ class LoadCoefficients:
         Change of ``angle_of_attack`` for each metre that the normal force moves forward as a whole, N/rad.
     bending, slosh : (modes, s) and (tanks, s) arrays
         N s2.
+    center_of_gravity_offset : (s,) array
+        Moment for each metre by which all masses lie beside the thrust axis and m/s2 along it (kg).
+    p_delta : (modes, s) array
+        Moment for each m of a mode and m/s2 of thrust over mass (kg).
     first_moment, second_moment : (s,) arrays
         S_1 (kg m) and S_2 (kg m2), by which the rigid body answers forces and couples.
     attitude_rate : (s,) array
@@ -87,6 +95,8 @@ class LoadCoefficients:
     center_of_pressure: NDArray[np.float64]
     bending: NDArray[np.float64]
     slosh: NDArray[np.float64]
+    center_of_gravity_offset: NDArray[np.float64]
+    p_delta: NDArray[np.float64]
     first_moment: NDArray[np.float64]
     second_moment: NDArray[np.float64]
     attitude_rate: NDArray[np.float64]
@@ -123,12 +133,17 @@ def load_coefficients(vehicle: LoadedVehicle, stations: NDArray[np.float64]) -> 
     _refuse_modes_of_other_masses(vehicle, mass, center, inertia)
     ahead = np.maximum(vehicle.slosh_point[:, None] - stations, 0.0)
     air = vehicle.normal_force
+    turning = second * mass / inertia
+    shape, at_gimbal = line.at(vehicle.displacement, stations), line.at(vehicle.displacement, np.zeros(1))
+    bent = line.forward(mu * vehicle.displacement, stations) - shape * line.forward(mu, stations)
     return LoadCoefficients(
         angle_of_attack=free(air),
         engine_angle=engine,
         center_of_pressure=line.forward(air, stations) - second * line.total(air) / inertia,
         bending=-moment_about_station(mu * vehicle.displacement, r * vehicle.rotation),
         slosh=-vehicle.slosh_mass[:, None] * ahead,
+        center_of_gravity_offset=line.forward(mu, stations) - turning,
+        p_delta=bent + turning * at_gimbal - np.where(stations < 0, mass * (at_gimbal - shape), 0.0),
         first_moment=first,
         second_moment=second,
         attitude_rate=-free(air * (x - center)) / vehicle.relative_velocity,
@@ -161,6 +176,8 @@ def load_columns(coefficients: LoadCoefficients, tanks: Sequence[str]) -> dict[t
         ("first_moment", "kg m"): c.first_moment,
         ("second_moment", "kg m2"): c.second_moment,
         ("center_of_pressure", "N/rad"): c.center_of_pressure,
+        ("center_of_gravity_offset", "kg"): c.center_of_gravity_offset,
+        **{(f"p_delta_{i}", "kg"): row for i, row in enumerate(c.p_delta, start=1)},
     }
 
 

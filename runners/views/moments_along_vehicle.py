@@ -14,13 +14,13 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ...model.equations.load_components import component_columns
+from ...model.equations.load_components import component_columns, deviation_output
 from ...model.equations.noise_loads import noise_load
 from ...model.equations.station_loads import StationLoads, load_station_loads
 from ...model.errors import DataError, IntegrationError
 from ...model.system.names import COMBINED
 from ...model.vehicle.columns import local_load_columns
-from ...model.vehicle.noise_loads import loading_noises
+from ...model.vehicle.noise_loads import loading_deviations
 from ...model.vehicle.vehicle import Vehicle
 from ..case.provenance import provenance
 from ..solvers.time_nodes import interval_before, time_nodes
@@ -85,7 +85,7 @@ def load_rows(
     loads = load_station_loads(vehicle)
     chosen = np.arange(loads.station.size) if stations is None else _chosen(loads, stations, vehicle)
     names = list(
-        component_columns(len(vehicle.bending), [tank.name for tank in vehicle.slosh], loading_noises(vehicle.file))
+        component_columns(len(vehicle.bending), [tank.name for tank in vehicle.slosh], loading_deviations(vehicle.file))
     )
     components = _with_components(study)
     components.system.refuse_direct_noise(names)
@@ -151,7 +151,7 @@ def moments_along_vehicle(
     vehicle = study.vehicle_for("the bending moment along the vehicle")
     loads = load_station_loads(vehicle)
     tanks = [tank.name for tank in vehicle.slosh]
-    names = list(component_columns(len(vehicle.bending), tanks, loading_noises(vehicle.file)))
+    names = list(component_columns(len(vehicle.bending), tanks, loading_deviations(vehicle.file)))
     components = _with_components(study)
     if engine is None:
         engine = "covariance" if study.executable.shared_library is None else "sweep"
@@ -217,13 +217,15 @@ def station_rows(
     if slosh_reaction:
         columns |= _with_reaction(columns, loads, tanks, flight)
     file, area = vehicle.file, study.parameters["reference_area"].value
-    noises = loading_noises(file)
+    if file.options.p_delta:
+        for i in range(1, len(vehicle.bending) + 1):
+            pull = columns[f"p_delta_{i}"] * flight["thrust"] / flight["mass"]
+            columns[f"bending_displacement_{i}"] = columns[f"bending_displacement_{i}"] + pull
+    deviations = loading_deviations(file)
     means = flight["mean.angle_of_attack"], flight["mean.engine_angle"]
-    for name, tables in noises.items():
-        columns[f"relative_deviation_{name}"] = noise_load(
-            tables, file.options.noise_loads, columns, flight, area, *means
-        )
-    wanted = component_columns(len(vehicle.bending), tanks, noises)
+    for name, tables in deviations.items():
+        columns[deviation_output(name)] = noise_load(tables, file.options.noise_loads, columns, flight, area, *means)
+    wanted = component_columns(len(vehicle.bending), tanks, deviations)
     return np.stack([columns[c] for c in wanted.values()], axis=2)
 
 

@@ -1,0 +1,93 @@
+"""Biases: what is constant over a flight and random from flight to flight (docs/equations.md, section 5).
+
+thrust                    relative, on the tables thrust and control_thrust
+center_of_pressure        relative, on the table center_of_pressure
+center_of_gravity_offset  m towards +Y, of every section's mass from the thrust axis
+thrust_misalignment       rad, of the control engines' thrust from the direction that they are turned to
+wind                      relative, of the mean wind at all altitudes
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import DataError
+from .vehicle import Vehicle
+from .vehicle_file import AngleBiasEntry, LengthBiasEntry, RelativeBiasEntry, VehicleFile
+
+CENTER_OF_GRAVITY_OFFSET = "center_of_gravity_offset"
+THRUST_MISALIGNMENT = "thrust_misalignment"
+WIND_BIAS = "wind_bias"
+
+
+@dataclass(frozen=True)
+class Bias:
+    """A bias of a vehicle.
+
+    Attributes
+    ----------
+    key : str
+        Under [biases] of vehicle.toml.
+    source : str
+        Its name among the sources of a result.
+    standard_deviation : float
+        In ``unit``.
+    unit : str
+        SI; '1' of a relative error.
+    tables : tuple of str
+        Those that it deviates by a common factor.
+    """
+
+    key: str
+    source: str
+    standard_deviation: float
+    unit: str
+    tables: tuple[str, ...] = ()
+
+
+_SOURCES = {
+    "thrust": ("thrust_bias", ("thrust", "control_thrust")),
+    "center_of_pressure": ("center_of_pressure_bias", ("center_of_pressure",)),
+    CENTER_OF_GRAVITY_OFFSET: (CENTER_OF_GRAVITY_OFFSET, ()),
+    THRUST_MISALIGNMENT: (THRUST_MISALIGNMENT, ()),
+    "wind": (WIND_BIAS, ()),
+}
+
+
+def vehicle_biases(file: VehicleFile) -> dict[str, Bias]:
+    """Return the biases that a vehicle has, by source."""
+    found = {}
+    for key, (source, tables) in _SOURCES.items():
+        entry = getattr(file.biases, key)
+        if entry is not None:
+            found[source] = Bias(key, source, *_in_si(entry), tables)
+    return found
+
+
+def _in_si(entry: RelativeBiasEntry | LengthBiasEntry | AngleBiasEntry) -> tuple[float, str]:
+    if isinstance(entry, RelativeBiasEntry):
+        return entry.standard_deviation, "1"
+    if isinstance(entry, LengthBiasEntry):
+        return entry.standard_deviation_m, "m"
+    return math.radians(entry.standard_deviation_deg), "rad"
+
+
+def check_biases(vehicle: Vehicle) -> None:
+    """Refuse a relative error of what is zero.
+
+    Raises
+    ------
+    DataError
+    """
+    nothing = {"wind": vehicle.wind.mean, "thrust": vehicle.tables["control_thrust"]}
+    for bias in vehicle_biases(vehicle.file).values():
+        if bias.key in nothing and not np.any(nothing[bias.key].values):
+            raise DataError(
+                f"is a relative error, but '{nothing[bias.key].name}' is zero everywhere: a bias with no "
+                "spread; remove it",
+                file=vehicle.folder / "vehicle.toml",
+                column=f"biases.{bias.key}",
+            )
