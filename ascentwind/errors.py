@@ -45,6 +45,7 @@ __getattr__, __dir__, __all__ = _lazy.attach(
         "runners.parameter_study.store": ["ResumeError"],
         "runners.sensitivity.one": ["UndefinedElasticityWarning"],
         "runners.sensitivity.request": [
+            "GroupedFactorError",
             "NotAParameterError",
             "StructuralParameterError",
             "TableParameterError",

@@ -38,6 +38,7 @@ from .runners.parameter_study.cluster import SchedulerError as SchedulerError
 from .runners.parameter_study.sampling import UnbalancedSampleWarning as UnbalancedSampleWarning
 from .runners.parameter_study.store import ResumeError as ResumeError
 from .runners.sensitivity.one import UndefinedElasticityWarning as UndefinedElasticityWarning
+from .runners.sensitivity.request import GroupedFactorError as GroupedFactorError
 from .runners.sensitivity.request import NotAParameterError as NotAParameterError
 from .runners.sensitivity.request import StructuralParameterError as StructuralParameterError
 from .runners.sensitivity.request import TableParameterError as TableParameterError

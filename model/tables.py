@@ -7,8 +7,8 @@ changing a table value needs no new code, only the number of knots and tables is
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import Literal
@@ -184,6 +184,12 @@ class TableGroup:
             knots,
             np.stack(columns, axis=2),
         )
+
+    def scaled(self, factors: Mapping[str, float]) -> TableGroup:
+        """Return the group with some of its tables multiplied; names of other groups' tables are passed over."""
+        if not factors.keys() & set(self.names):
+            return self
+        return replace(self, coefficients=self.coefficients * np.array([factors.get(name, 1.0) for name in self.names]))
 
     @property
     def size(self) -> int:

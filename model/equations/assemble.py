@@ -62,7 +62,7 @@ def assemble(vehicle: Vehicle, wind_start_covariance: np.ndarray) -> LinearSyste
         *(deviation_block(name, process) for name, process in deviations.items()),
         *_position(vehicle, motion),
     ]
-    responses = outputs(vehicle, numbers, motion, solved)
+    responses = outputs(vehicle, numbers, motion, solved, handles)
     states = tuple(state for block in blocks for state in block.states)
     x = ca.vertcat(*(block.symbols for block in blocks))
     equations = Undeviated(

@@ -45,7 +45,7 @@ def bending_moment(
     return moment
 
 
-def bent_axis_moment(tables: TableSymbols, output: str, eta: ca.SX) -> ca.SX:
+def bent_axis_moment(tables: TableSymbols, output: str, thrust: ca.SX, eta: ca.SX) -> ca.SX:
     """What thrust on the displaced gimbal adds to 4-13, N m: F_TX / m sum_j (p_delta_j) eta_j.
 
     The forces along the axis pull at the bent axis forward of the station, less the answer of the rigid body to the
@@ -53,7 +53,7 @@ def bent_axis_moment(tables: TableSymbols, output: str, eta: ca.SX) -> ca.SX:
     """
     coefficients = tables.under(f"loads.{output}.")
     columns = ca.vertcat(ca.SX(0, 1), *(coefficients[f"p_delta_{i + 1}"] for i in range(eta.numel())))
-    return tables["thrust"] / tables["mass"] * ca.dot(columns, eta)
+    return thrust / tables["mass"] * ca.dot(columns, eta)
 
 
 def tanks_forward(vehicle: Vehicle, load: LoadEntry, time: ca.SX, parameters: ParameterSymbols) -> ca.SX:

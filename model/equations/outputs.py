@@ -11,6 +11,7 @@ from ..vehicle.noise_loads import loading_deviations
 from ..vehicle.vehicle import Vehicle
 from ..vehicle.vehicle_file import ExtraOutput, LoadEntry
 from .coupling import Accelerations
+from .forces import Handles
 from .load_components import load_components
 from .loads import bending_moment, bent_axis_moment, slosh_reaction, tanks_forward, typical_moment
 from .local_aerodynamics import local_bending_moment
@@ -21,9 +22,9 @@ from .vehicle_numbers import Numbers
 Value = tuple[Output, ca.SX]
 
 
-def outputs(vehicle: Vehicle, numbers: Numbers, motion: Motion, solved: Accelerations) -> list[Value]:
+def outputs(vehicle: Vehicle, numbers: Numbers, motion: Motion, solved: Accelerations, handles: Handles) -> list[Value]:
     """Return the outputs with their expressions, the loads first."""
-    found = [_load(vehicle, load, numbers, motion, solved) for load in vehicle.file.loads]
+    found = [_load(vehicle, load, numbers, motion, solved, handles) for load in vehicle.file.loads]
     found.append((Output("angle_of_attack", "rad", SCALES["angle"], "alpha"), motion.alpha))
     found.append((Output("engine_angle", "rad", SCALES["angle"], "beta"), motion.beta))
     for extra in dict.fromkeys(vehicle.file.options.extra_outputs):
@@ -31,7 +32,9 @@ def outputs(vehicle: Vehicle, numbers: Numbers, motion: Motion, solved: Accelera
     return found
 
 
-def _load(vehicle: Vehicle, load: LoadEntry, numbers: Numbers, motion: Motion, solved: Accelerations) -> Value:
+def _load(
+    vehicle: Vehicle, load: LoadEntry, numbers: Numbers, motion: Motion, solved: Accelerations, handles: Handles
+) -> Value:
     tables, tanks, options = numbers.tables, numbers.tanks, vehicle.file.options
     moment = bending_moment(tables, load.output, tanks, motion.alpha, motion.beta, solved.bending, solved.slosh)
     if options.local_angle_of_attack:
@@ -40,7 +43,7 @@ def _load(vehicle: Vehicle, load: LoadEntry, numbers: Numbers, motion: Motion, s
         forward = tanks_forward(vehicle, load, numbers.time, numbers.parameters)
         moment += slosh_reaction(tables, load.output, tanks, forward, motion.xi, solved.slosh)
     if options.p_delta:
-        moment += bent_axis_moment(tables, load.output, motion.eta)
+        moment += bent_axis_moment(tables, load.output, handles.bent_thrust, motion.eta)
     scale = typical_moment(vehicle.tables[f"loads.{load.output}.angle_of_attack"])
     return Output(load.output, "N m", scale, f"B.M. at station {load.station_m:g} m"), moment
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ...codegen.system.executable import ExecutableSystem
 from ...model.errors import DataError, ParameterValueError, suggestion
 from ...model.tables import TableGroup
+from ...model.vehicle.grouped_factors import grouped_factors
 from ..sensitivity.request import is_structure
 from ..study import Study
 from .plan import ParameterStudyPlan, PlannedQuantity
@@ -61,20 +62,31 @@ def resolve_quantities(study: Study, plan: ParameterStudyPlan) -> tuple[Quantity
     found = []
     for i, planned in enumerate(plan.quantities):
         where = f"{plan.kind}.quantity.{i}"
-        for target in planned.targets:
+        targets = tuple(one for target in planned.targets for one in _members(study, target))
+        for target in targets:
             _check_target(study, target, where)
             if target in taken:
                 raise DataError(
                     f"'{target}' already belongs to quantity '{taken[target]}'; a number has one value", column=where
                 )
             taken[target] = planned.name
-        found.append(_resolve(study, planned, where))
+        found.append(_resolve(study, planned, targets, where))
     return tuple(found)
+
+
+def _grouped(study: Study) -> dict[str, tuple[str, ...]]:
+    """Return by name of a grouped factor the targets that it stands for."""
+    groups = {} if study.vehicle is None else grouped_factors(study.vehicle.tables)
+    return {name: tuple(TABLES + table for table in tables) for name, tables in groups.items()}
+
+
+def _members(study: Study, target: str) -> tuple[str, ...]:
+    return _grouped(study).get(target, (target,))
 
 
 def _check_target(study: Study, name: str, where: str) -> None:
     tables = table_names(study.executable.groups)
-    known = [*study.system.parameter_names, *tables]
+    known = [*study.system.parameter_names, *tables, *_grouped(study)]
     if name in known:
         return
     if TABLES + name in tables:
@@ -88,9 +100,9 @@ def _check_target(study: Study, name: str, where: str) -> None:
     raise DataError(f"there is no parameter or table '{name}'{suggestion(name, known)}", column=where)
 
 
-def _resolve(study: Study, planned: PlannedQuantity, where: str) -> Quantity:
+def _resolve(study: Study, planned: PlannedQuantity, targets: tuple[str, ...], where: str) -> Quantity:
     parameters = study.parameters
-    values = {t: 1.0 if t not in parameters else parameters[t].value for t in planned.targets}
+    values = {t: 1.0 if t not in parameters else parameters[t].value for t in targets}
     if planned.relative:
         zero = next((t for t, value in values.items() if value == 0), None)
         if zero is not None:
@@ -98,13 +110,13 @@ def _resolve(study: Study, planned: PlannedQuantity, where: str) -> Quantity:
                 f"'{zero}' is zero, so that a factor on it changes nothing; give absolute numbers, without relative",
                 column=where,
             )
-        return Quantity(planned.name, "1", planned.targets, True, 1.0)
+        return Quantity(planned.name, "1", targets, True, 1.0)
     if len(set(values.values())) > 1:
         listed = ", ".join(f"{t} = {value:g}" for t, value in values.items())
         raise DataError(f"has parameters of different nominal value ({listed}); set relative = true", column=where)
-    first = planned.targets[0]
+    first = targets[0]
     unit = parameters[first].unit if first in parameters else "1"
-    return Quantity(planned.name, unit, planned.targets, False, values[first])
+    return Quantity(planned.name, unit, targets, False, values[first])
 
 
 def member_numbers(study: Study, quantities: Sequence[Quantity], row: NDArray[np.float64]) -> ExecutableSystem:
@@ -128,7 +140,7 @@ def member_numbers(study: Study, quantities: Sequence[Quantity], row: NDArray[np
                 changes[target] = value * parameters[target].value if quantity.relative else value
             else:
                 factors[target.removeprefix(TABLES)] = _checked_factor(target, value)
-    groups = tuple(_scaled(group, factors) for group in study.executable.groups)
+    groups = tuple(group.scaled(factors) for group in study.executable.groups)
     return study.executable.with_numbers(groups=groups, parameters=study.numbers(changes))
 
 
@@ -138,10 +150,3 @@ def _checked_factor(table: str, factor: float) -> float:
     if (last in POSITIVE and factor <= 0) or (last in NOT_NEGATIVE and factor < 0):
         raise ParameterValueError(f"a factor of {factor:g} on '{table}' leaves it no sense; give a positive one")
     return factor
-
-
-def _scaled(group: TableGroup, factors: dict[str, float]) -> TableGroup:
-    """Return a group with some of its tables multiplied."""
-    if not factors.keys() & set(group.names):
-        return group
-    return replace(group, coefficients=group.coefficients * np.array([factors.get(name, 1.0) for name in group.names]))

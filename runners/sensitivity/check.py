@@ -112,6 +112,16 @@ def check_sensitivity(
         derivatives.append(derivative)
         reach = 0.5 * meeting.get(case.system.parameter_names.index(name), np.inf)
         differences.append(_difference(of_parameter, number, min(reach, STEP * (abs(number) or 1.0)), value))
+    for name, tables, derivative in _grouped_factors(found, parameters):
+
+        def of_factor(x: float, tables: list[str] = tables) -> float:
+            groups = tuple(group.scaled(dict.fromkeys(tables, x)) for group in executable.groups)
+            return _value(executable.with_numbers(groups=groups), request, time)
+
+        labels.append(name)
+        at.append(1.0)
+        derivatives.append(derivative)
+        differences.append(_difference(of_factor, 1.0, STEP, value))
     for k in _largest_rows(found, rows):
         vehicle = case.vehicle_for("a table row")
         name, number = str(found["knot_table"].values[k]), float(found["knot_value"].values[k])
@@ -155,6 +165,14 @@ def _largest_rows(found: xr.Dataset, count: int) -> list[int]:
         if len(chosen) == count:
             break
     return list(chosen.values())
+
+
+def _grouped_factors(found: xr.Dataset, parameters: Iterable[str] | None) -> list[tuple[str, list[str], float]]:
+    """Return name, tables and derivative of each grouped factor, none where parameters are named."""
+    if parameters is not None or "grouped_factor" not in found:
+        return []
+    parts = (found[f"grouped_factor{part}"].values.tolist() for part in ("", "_tables", "_derivative"))
+    return [(name, tables.split(", "), derivative) for name, tables, derivative in zip(*parts, strict=True)]
 
 
 def _reach(vehicle: Vehicle, name: str, row: int) -> float:

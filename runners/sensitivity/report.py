@@ -37,6 +37,12 @@ def print_sensitivity(found: xr.Dataset, console: Console) -> None:
         for name, size in largest(found["table"].values, found["table_elasticity"].values, SHOWN):
             table.add_row(name, f"{size:+.4f}")
         console.print(table)
+    if found.sizes.get("grouped_factor"):
+        table = Table("grouped factor", title="Tables that one cause moves together")
+        table.add_column("% per %", justify="right")
+        for name, size in zip(found["grouped_factor"].values, found["grouped_factor_elasticity"].values, strict=True):
+            table.add_row(str(name), f"{float(size):+.4f}")
+        console.print(table)
     if found.attrs["peak_at_end_of_range"]:
         console.print("The peak is an end of the range searched; the true one may lie beyond.", style="dim")
 
@@ -75,6 +81,11 @@ def sensitivity_csv(found: xr.Dataset) -> str:
     if "table_elasticity" in found:
         none = [None] * found.sizes["table"]
         rows("table", column("table"), none, none, none, column("table_elasticity"))
+    if found.sizes.get("grouped_factor"):
+        of_factors = (column(f"grouped_factor{part}") for part in ("", "_derivative", "_elasticity"))
+        names, derivatives, elasticities = of_factors
+        none = [None] * len(names)
+        rows("grouped factor", names, none, [1.0] * len(names), derivatives, elasticities)
     if "knot_elasticity" in found:
         rows("row", *(column(f"knot_{n}") for n in ("table", "argument", "value", "derivative", "elasticity")))
     for name in ("wind_sigma_elasticity", "wind_mean_elasticity"):

@@ -10,6 +10,7 @@ import numpy as np
 from ...codegen.nodes.compiled import node_functions_of
 from ...model.errors import AscentwindError, UnknownNameError
 from ...model.system.names import COMBINED
+from ...model.vehicle.grouped_factors import grouped_factors
 from ...model.vehicle.structural_keys import structural_keys
 from ..case.case import Case
 from ..solvers.flight_nodes import FlightNodes
@@ -48,6 +49,15 @@ class TableParameterError(NotAParameterError):
     why = (
         "a table, not a parameter: every sensitivity has its derivatives over time (table_derivative), by rows "
         "(knot_derivative) and as a whole (table_elasticity); leave it out"
+    )
+
+
+class GroupedFactorError(NotAParameterError):
+    """A derivative by a parameter was asked for with the name of a grouped factor, which is on several tables."""
+
+    why = (
+        "a factor on several tables, not a parameter: every sensitivity has its derivative "
+        "(grouped_factor_derivative, grouped_factor_elasticity); leave it out"
     )
 
 
@@ -155,6 +165,8 @@ def parameter_rows(case: Case, wanted: Iterable[str] | None) -> list[int]:
         if name not in names:
             if is_structure(case, name):
                 raise StructuralParameterError(name)
+            if case.vehicle is not None and name in grouped_factors(case.vehicle.tables):
+                raise GroupedFactorError(name)
             if any(name in group.names for group in system.tables):
                 raise TableParameterError(name)
             raise UnknownNameError("parameter", name, names)

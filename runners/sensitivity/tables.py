@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...model.tables import TableGroup
+from ...model.vehicle.grouped_factors import grouped_factors
+from ...model.vehicle.vehicle import Vehicle
 from ..present.netcdf import RULE
 from ..solvers.collocation_grid import tables_at
 from .gradient import Gradient
@@ -82,12 +84,16 @@ def table_sensitivities(
     if over is not None:
         attributes = {"units": units[names.index(over)], "long_name": f"{over} at a time"}
         variables[over] = ("t", values[:, names.index(over)], attributes)
+    by_factor = weights @ (total.along * values) + total.at_end * values_at_end
+    through = np.zeros(len(names)) if start is None else _through_start(case, start, names)
+    by_factor = by_factor + through
+    if case.vehicle is not None:
+        more = _by_grouped_factor(case.vehicle, names, by_factor, value)
+        variables, coordinates = variables | more[0], coordinates | more[1]
     if value is None:
         return variables, coordinates
-    relative = (weights @ (total.along * values) + total.at_end * values_at_end) / value
+    relative, through = by_factor / value, through / value
     if start is not None:
-        through = _through_start(case, start, names) / value
-        relative = relative + through
         label = {"units": "1", "long_name": "part of it by the covariance at the start"}
         variables["table_elasticity_through_start"] = ("table", through[columns], label)
     label = {"units": "1", "long_name": "percent per percent of the whole table, others held"}
@@ -96,6 +102,19 @@ def table_sensitivities(
         more = _by_kilometre(pair, total, names, names.index(over), value)
         variables, coordinates = variables | more[0], coordinates | more[1]
     return variables, coordinates
+
+
+def _by_grouped_factor(vehicle: Vehicle, names: list[str], by_factor: NDArray, value: float | None) -> Parts:
+    """Return the derivatives by factors on several tables together, at a factor of 1."""
+    groups = grouped_factors(vehicle.tables)
+    found = np.array([sum(by_factor[names.index(name)] for name in tables) for tables in groups.values()])
+    label = {RULE: "quantity", "long_name": "derivative with respect to a factor on several tables"}
+    variables: dict[str, tuple] = {"grouped_factor_derivative": ("grouped_factor", found, label)}
+    if value is not None:
+        label = {"units": "1", "long_name": "percent per percent of several tables together"}
+        variables["grouped_factor_elasticity"] = ("grouped_factor", found / value, label)
+    of_group = ("grouped_factor", [", ".join(tables) for tables in groups.values()])
+    return variables, {"grouped_factor": list(groups), "grouped_factor_tables": of_group}
 
 
 def _by_kilometre(pair: AdjointPair, total: TotalDensity, names: list[str], over: int, value: float) -> Parts:

@@ -125,6 +125,77 @@ def test_thrust_is_the_balance_of_forces_forward_of_the_station(models, line):
     assert moment == pytest.approx(-inertia_forward(line, v, rates, lateral), rel=1e-3)
 
 
+@pytest.fixture(scope="module")
+def along_axis(cache) -> dict[str, Assembled]:
+    """The vehicle with biases that act along and beside its axis, without and with thrust on the displaced gimbal."""
+    changes = {
+        "biases.center_of_gravity_offset.standard_deviation_m": 0.02,
+        "biases.thrust_misalignment.standard_deviation_deg": 0.1,
+    }
+    found = {}
+    for name, p_delta in (("straight", False), ("bent", True)):
+        vehicle = load_vehicle(AS504, changes | {"options.p_delta": p_delta})
+        system = assemble(vehicle, np.diag([1.0, 3.0, 1.0]))
+        found[name] = Assembled(vehicle, system, core_functions(system))
+    return found
+
+
+def column_of(model: Assembled, state: str) -> tuple[dict[str, float], dict[str, float], dict[str, float]]:
+    """Return tables, and what a state of 1 puts into rates and outputs, by the assembled equations."""
+    v, A, _, C = model.at(TIME)
+    names, outputs = model.system.state_names, model.system.output_names
+    k = names.index(state)
+    return v, dict(zip(names, A[:, k], strict=True)), dict(zip(outputs, C[:, k], strict=True))
+
+
+def test_mass_beside_the_thrust_axis_is_the_balance_of_forces_forward_of_the_station(along_axis, line):
+    """Every section pulls with A_X beside the axis; the vehicle turns by the whole couple and does not move aside."""
+    v, rates, outputs = column_of(along_axis["straight"], "deviation_center_of_gravity_offset")
+    offset, forward = 0.02, line.x > STATION
+    assert rates["lateral_velocity"] == 0
+    couple = offset * (v["thrust"] - v["axial_drag"])
+    assert rates["attitude_rate"] == pytest.approx(couple / v["moment_of_inertia"], rel=1e-12)
+    pull = offset * v["axial_acceleration"] * line.mass[forward].sum()
+    expected = pull - inertia_forward(line, v, rates, 0.0)
+    assert outputs["bending_moment"] == pytest.approx(expected, rel=1e-3)
+    assert outputs["engine_angle"] == outputs["angle_of_attack"] == 0
+
+
+def test_misaligned_thrust_is_an_engine_angle_that_the_engines_do_not_have(along_axis, line):
+    """Side force and moment of the turned thrust, aft of the station; the engine angle itself stands."""
+    v, rates, outputs = column_of(along_axis["straight"], "deviation_thrust_misalignment")
+    side = np.radians(0.1) * v["control_thrust"]
+    assert rates["lateral_velocity"] == pytest.approx(side / v["mass"], rel=1e-12)
+    assert rates["attitude_rate"] == pytest.approx(-side * v["center_of_gravity"] / v["moment_of_inertia"], rel=1e-12)
+    expected = -inertia_forward(line, v, rates, rates["lateral_velocity"])
+    of_rigid_body = np.radians(0.1) * v["loads.bending_moment.engine_angle"]  # ten times what the modes leave of it
+    assert outputs["bending_moment"] == pytest.approx(expected, abs=1e-3 * of_rigid_body)
+    assert outputs["engine_angle"] == 0
+    assert all(rates[name] == 0 for name in rates if name.startswith(("T1", "T2", "T3")))
+
+
+@pytest.mark.parametrize("mode", [1, 2])
+def test_thrust_on_the_displaced_gimbal_is_a_balance_on_the_bent_axis(along_axis, line, mode):
+    """Inertia along the bent axis forward of the station less the answer to -F_TX Y_i(X_E) eta_i; no side force."""
+    _, straight, without = column_of(along_axis["straight"], f"bending_{mode}")
+    v, bent, with_it = column_of(along_axis["bent"], f"bending_{mode}")
+    rates = {name: bent[name] - straight[name] for name in bent}
+    assert rates["lateral_velocity"] == 0
+    couple = -v["thrust"] * v[f"bending.{mode}.displacement_at_gimbal"]
+    assert rates["attitude_rate"] == pytest.approx(couple / v["moment_of_inertia"], rel=1e-9)
+    shape = np.interp(line.x, line.numbers.modes.x, line.numbers.modes.displacement[line.row, mode - 1])
+    there = np.interp(STATION, line.numbers.modes.x, line.numbers.modes.displacement[line.row, mode - 1])
+    pull = v["thrust"] / v["mass"] * (line.mass * (shape - there))[line.x > STATION].sum()
+    expected = pull - inertia_forward(line, v, rates, 0.0)
+    assert with_it["bending_moment"] - without["bending_moment"] == pytest.approx(expected, rel=2e-3)
+
+
+def test_thrust_on_the_displaced_gimbal_does_not_deviate(along_axis):
+    """A product of a deviation and the bending; the column of the thrust is what it was."""
+    columns = [column_of(along_axis[name], "deviation_thrust")[1:] for name in ("straight", "bent")]
+    assert columns[0] == columns[1]
+
+
 def test_moved_normal_force_works_on_the_modes(models, line):
     """Eta'' of a moved centre of pressure: the rigid answer of slosh, and c'_N moved under the modes (4-10)."""
     v, reported, _ = deviation_columns(models["as_reported"], "center_of_pressure")

@@ -63,6 +63,40 @@ def particle_moments(vehicle: LoadedVehicle, force, couple, masses, rotary, side
 
 
 @pytest.mark.parametrize("side", [1, -1])
+def test_masses_beside_the_thrust_axis_load_stations_as_particles_do(vehicle, side):
+    """1 m beside it, at 1 m/s2 along it: every particle is a couple about the axis, and the thrust is on the axis."""
+    weights = vehicle.line.weights
+    masses, rotary = vehicle.mass * weights, vehicle.rotary_inertia * weights
+    expected = particle_moments(vehicle, np.zeros_like(masses), masses, masses, rotary, side)
+    found = load_coefficients(vehicle, STATIONS).center_of_gravity_offset
+    np.testing.assert_allclose(found, expected, atol=1e-10 * masses.sum())
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_thrust_on_a_bent_axis_loads_stations_as_particles_do(vehicle, side):
+    """Particles pull aft at the bent axis, the thrust forward at the gimbal; all turn as a rigid body."""
+    x, weights = vehicle.line.points, vehicle.line.weights
+    masses, rotary = vehicle.mass * weights, vehicle.rotary_inertia * weights
+    mass, center = masses.sum(), (x * masses).sum() / masses.sum()
+    inertia = (masses * (x - center) ** 2).sum() + rotary.sum()
+    found = load_coefficients(vehicle, STATIONS).p_delta
+    for mode, shape in enumerate(vehicle.displacement):
+        gimbal, *there = (straight_through(x, shape, s) for s in (0.0, *STATIONS))
+        turning = ((masses * shape).sum() - mass * gimbal) / inertia
+        for k, s in enumerate(STATIONS):
+            part = (x - s) * side > 0
+            net = masses * (shape - there[k]) - (masses * (x - s) * (x - center) + rotary) * turning
+            thrust = -mass * (gimbal - there[k]) * ((0.0 - s) * side > 0)
+            assert found[mode, k] == pytest.approx(side * (net[part].sum() + thrust), abs=1e-9 * mass)
+
+
+def straight_through(x: np.ndarray, shape: np.ndarray, at: float) -> float:
+    """Return a shape at an edge of the line by the two points of the element forward of it, aft of it at the nose."""
+    k = min(2 * int(np.searchsorted(x[::2], at)), x.size - 2)
+    return float(shape[k] + (shape[k + 1] - shape[k]) * (at - x[k]) / (x[k + 1] - x[k]))
+
+
+@pytest.mark.parametrize("side", [1, -1])
 def test_air_and_engine_moments_are_those_of_particles_from_either_side(vehicle, side):
     """The aft part gives the same moment as the forward part: inertia meets every force."""
     weights = vehicle.line.weights

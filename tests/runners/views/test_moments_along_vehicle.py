@@ -102,10 +102,20 @@ def test_every_station_is_the_moment_that_is_an_output_there(folder, options, no
     assert along["station"].values.tolist() == [25.0, 60.0]
 
 
-@pytest.mark.parametrize("options", [(), ("slosh_reaction", "local_angle_of_attack")])
+BIASES = {
+    "biases.thrust.standard_deviation": 0.01,
+    "biases.center_of_pressure.standard_deviation": 0.03,
+    "biases.center_of_gravity_offset.standard_deviation_m": 0.02,
+    "biases.thrust_misalignment.standard_deviation_deg": 0.1,
+    "biases.wind.standard_deviation": 0.1,
+}
+
+
+@pytest.mark.parametrize("options", [(), ("slosh_reaction", "local_angle_of_attack"), ("p_delta",)])
 def test_rows_are_those_of_the_moment_that_is_an_output_there(folder, options):
     """Coefficient by coefficient, from the left where the flight jumps: C and G u of the outputs."""
-    study = Study.load(folder, compile=False, changes={f"options.{name}": True for name in options})
+    changes = {f"options.{name}": True for name in options} | (BIASES if "p_delta" in options else {})
+    study = Study.load(folder, compile=False, changes=changes)
     times = [30.0, 70.0, 105.6]
     found = load_rows(study, times, [60.0, 25.0], slosh_reaction="slosh_reaction" in options)
     outputs = [study.system.output_index(name) for name in ("bending_moment_b", "bending_moment")]
