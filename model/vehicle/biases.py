@@ -55,6 +55,12 @@ _SOURCES = {
     THRUST_MISALIGNMENT: (THRUST_MISALIGNMENT, ()),
     "wind": (WIND_BIAS, ()),
 }
+# key of the sigma, SI unit, and what one of the file's is in it
+_UNITS = {
+    RelativeBiasEntry: ("standard_deviation", "1", 1.0),
+    LengthBiasEntry: ("standard_deviation_m", "m", 1.0),
+    AngleBiasEntry: ("standard_deviation_deg", "rad", math.radians(1.0)),
+}
 
 
 def vehicle_biases(file: VehicleFile) -> dict[str, Bias]:
@@ -63,16 +69,9 @@ def vehicle_biases(file: VehicleFile) -> dict[str, Bias]:
     for key, (source, tables) in _SOURCES.items():
         entry = getattr(file.biases, key)
         if entry is not None:
-            found[source] = Bias(key, source, *_in_si(entry), tables)
+            file_key, unit, factor = _UNITS[type(entry)]
+            found[source] = Bias(key, source, factor * getattr(entry, file_key), unit, tables)
     return found
-
-
-def _in_si(entry: RelativeBiasEntry | LengthBiasEntry | AngleBiasEntry) -> tuple[float, str]:
-    if isinstance(entry, RelativeBiasEntry):
-        return entry.standard_deviation, "1"
-    if isinstance(entry, LengthBiasEntry):
-        return entry.standard_deviation_m, "m"
-    return math.radians(entry.standard_deviation_deg), "rad"
 
 
 def check_biases(vehicle: Vehicle) -> None:

@@ -79,6 +79,13 @@ def _moved_columns(file: VehicleFile) -> tuple[tuple[Column, ...], tuple[Column,
     return ((MOVED_LINE,), (MOVED_MODE,)) if file.options.noise_loads == "moved_line" else ((SECOND_MOMENT,), ())
 
 
+def needed_for(column: str) -> str | None:
+    """Return the key of vehicle.toml that alone asks for a column of a load's table; None of any other column."""
+    if column == OFFSET_MASS.name:
+        return f"biases.{CENTER_OF_GRAVITY_OFFSET}"
+    return "options.p_delta" if column.startswith("p_delta_") else None
+
+
 def form_is_open(file: VehicleFile) -> bool:
     """Return whether the file leaves it to its tables what a moved centre of pressure does to the loads."""
     return "noise_loads" not in file.options.model_fields_set and any(_moved_columns(file))

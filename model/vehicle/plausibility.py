@@ -7,6 +7,7 @@ column. docs/bring-your-own-vehicle.md lists them.
 
 from __future__ import annotations
 
+import math
 import re
 import warnings
 from collections.abc import Iterator
@@ -21,6 +22,7 @@ from numpy.typing import NDArray
 
 from ..errors import DataError, PlausibilityWarning
 from ..tables import Table
+from .biases import vehicle_biases
 
 if TYPE_CHECKING:
     from .vehicle import Vehicle
@@ -33,6 +35,13 @@ FELT = 0.1  # of the largest dynamic pressure: below, ratios to it are of no con
 SHORTEST = 0.01  # s, between rows whose difference is taken as a rate
 SLOSH_ROOT = 1.841  # omega^2 R / a of the first lateral mode in a deep circular tank
 SAME_STATION = 1e-3  # m
+# one sigma of biases: number shown of what is kept, least and largest of them without a word, in what unit
+RELATIVE_BIAS = 1.0, 5e-4, 0.2, "parts of 1"
+BIASES = {
+    "center_of_gravity_offset": (1.0, 1e-4, 0.5, "m"),
+    "thrust_misalignment": (math.degrees(1.0), 1e-3, 1.0, "degrees"),
+    "wind": (1.0, 5e-4, 0.5, "parts of 1"),
+}
 CURVED = 3.0  # times the waves of a uniform beam: slopes change faster where a vehicle is slender
 NEAREST = 0.02  # of the length, between places whose displacements tell a slope
 MOST_TOLD = 3
@@ -126,6 +135,12 @@ def assumptions(vehicle: Vehicle) -> Iterator[Contradiction]:
                 f"where the flight lasts {flight:.3g} s and no deviation of {tables} changes within 0.02 s; it is in "
                 "seconds",
             )  # fmt: skip
+    for bias in vehicle_biases(vehicle.file).values():
+        shown, low, high, unit = BIASES.get(bias.key, RELATIVE_BIAS)
+        yield from beyond(
+            f"biases.{bias.key}", shown * bias.standard_deviation, low, high,
+            f"one sigma in {unit}; those of launch vehicles lie between {low:g} and {high:g}",
+        )  # fmt: skip
     text = "of the critical damping, where {} have {}; it is a ratio, not a percentage"
     for i, mode in enumerate(vehicle.file.bending):
         key = f"bending.{i}.damping"

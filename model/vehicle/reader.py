@@ -46,7 +46,7 @@ from .columns import (
 )
 from .coverage import check_schedule, check_wind, loaded_flight
 from .names import name_faults
-from .noise_loads import check_noises, form_is_open, form_of_tables, needed_columns
+from .noise_loads import check_noises, form_is_open, form_of_tables, needed_columns, needed_for
 from .plausibility import check_plausibility
 from .shipped import VEHICLE_FILE
 from .vehicle import TableSource, Vehicle
@@ -244,6 +244,9 @@ class _Reader:
         x, collector = csv.columns[argument.name], DataErrorCollector()
         for column in columns:
             with collector.part():
+                if column.name not in csv.columns and (key := needed_for(column.name)):
+                    why = f"is missing, but {key} needs it; 'ascentwind build-vehicle' writes it"
+                    raise DataError(why, file=csv.file, column=column.label)
                 csv.column(column.name, column.unit)
                 if column.sign:
                     csv.require_positive(column.name, allow_zero=column.sign == "0")

@@ -290,6 +290,19 @@ def test_noise_levels_and_dampings_of_no_vehicle(tmp_path, old, new, message):
         load_vehicle(toml.parent)
 
 
+@pytest.mark.parametrize(
+    ("key", "sigma", "message"),
+    [
+        ("thrust.standard_deviation", 1.0, "'biases.thrust': is 1, one sigma in parts of 1; those .* 0.0005 and 0.2"),
+        ("thrust_misalignment.standard_deviation_deg", 5.0, "'biases.thrust_misalignment': is 5, one sigma in degrees"),
+        ("center_of_gravity_offset.standard_deviation_m", 20.0, "'biases.center_of_gravity_offset': is 20, .* in m"),
+    ],
+)
+def test_biases_of_no_vehicle(key, sigma, message):
+    with pytest.warns(PlausibilityWarning, match=message):
+        load_vehicle(built_in_vehicles()["falcon1"], {f"biases.{key}": sigma})
+
+
 def test_a_sample_of_the_wind_filter_that_stands_apart(tmp_path):
     (file,) = copied("falcon1", tmp_path).glob("*filter.json")
     filter_ = json.loads(file.read_text())

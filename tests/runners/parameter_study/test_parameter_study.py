@@ -170,3 +170,21 @@ def test_too_few_members_with_numbers(study, tmp_path):
     result = run_parameter_study(given, tmp_path, study=study)
     with pytest.raises(DataError, match="0 of the members have numbers"):
         spread(result)
+
+
+def test_aerodynamics_is_one_factor_on_every_normal_force(as504, tmp_path):
+    """The other road: the area of all forces of motion, and the coefficients of the load."""
+    of_load = [f"tables.loads.bending_moment.{name}" for name in ("angle_of_attack", "center_of_pressure")]
+    other = {"name": "other", "parameters": ["reference_area", *of_load], "relative": True, "values": [1.0, 1.1]}
+    found = []
+    for quantity in ({"name": "aerodynamics", "values": [1.0, 1.1]}, other):
+        given = {"format": 1, "title": "t", "times": "40,75", "grid": {"quantity": [quantity]}}
+        folder = tmp_path / str(quantity["name"])
+        found.append(run_parameter_study(given, folder, study=as504).data["std"].values)
+    np.testing.assert_allclose(found[0], found[1], rtol=1e-9)
+    assert not np.allclose(found[0][0], found[0][1], rtol=1e-3)
+    overlapping = [{"name": name, "values": [1.0, 1.1]} for name in ("aerodynamics", "tables.normal_force_slope")]
+    with pytest.raises(DataError, match="'tables.normal_force_slope' already belongs to quantity 'aerodynamics'"):
+        run_parameter_study(
+            {"format": 1, "title": "t", "grid": {"quantity": overlapping}}, tmp_path / "three", study=as504
+        )

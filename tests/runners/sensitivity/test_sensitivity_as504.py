@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from ascentwind.codegen.nodes.compiled import node_functions_of
-from ascentwind.runners import Cvodes
+from ascentwind.runners import Cvodes, Sweep
 from ascentwind.runners.sensitivity.check import _with_row, central_difference, of_vehicle
 from ascentwind.runners.sensitivity.gradient import gradient_of
 from ascentwind.runners.sensitivity.pair import AdjointPair
+from ascentwind.runners.sensitivity.request import GroupedFactorError
 from ascentwind.runners.solvers.adjoint import AdjointSolver
 from ascentwind.runners.solvers.collocation_grid import StepLengths
 from ascentwind.runners.solvers.flight_nodes import FlightNodes
@@ -145,3 +148,40 @@ def test_dimensional_analysis_of_the_networks(at_75):
         denominator = e[[n for n in e.index if n.startswith(f"control.{network}.denominator")]].sum()
         assert numerator == pytest.approx(-denominator, rel=1e-6)
         assert numerator == pytest.approx(e[f"control.{network}.gain"], rel=1e-6)
+
+
+@pytest.fixture(scope="module")
+def aerodynamics(at_75) -> list[str]:
+    """The tables of that grouped factor."""
+    return at_75["grouped_factor_tables"].sel(grouped_factor="aerodynamics").item().split(", ")
+
+
+def test_aerodynamics_is_the_change_of_all_normal_forces_by_one_percent(as504, at_75, aerodynamics):
+    """Other numbers in the sweep's tables, among them the mean that thrust and centre-of-pressure noise follow."""
+
+    def variance(factor: float) -> float:
+        groups = tuple(g.scaled(dict.fromkeys(aerodynamics, factor)) for g in as504.executable.groups)
+        changed = replace(as504, executable=as504.executable.with_numbers(groups=groups))
+        found = changed.response_statistics(
+            [75.0], responses=["bending_moment"], engine=Sweep(relative_tolerance=1e-10)
+        )
+        return found["variance"].sel(source="combined").item()
+
+    difference = central_difference(variance, 1.0, 0.01)
+    derivative = at_75["grouped_factor_derivative"].item()
+    assert derivative == pytest.approx(difference.derivative, rel=1e-6)
+    assert at_75["grouped_factor_elasticity"].item() == pytest.approx(derivative / at_75.attrs["value"], rel=1e-12)
+
+
+def test_aerodynamics_is_the_reference_area_with_what_the_loads_hold_of_it(at_75, aerodynamics):
+    """Forces of motion hold the area, those of loads their own coefficients: two ways to the same factor."""
+    of_loads = [name for name in aerodynamics if name.startswith("loads.")]
+    assert of_loads == ["loads.bending_moment.angle_of_attack", "loads.bending_moment.center_of_pressure"]
+    expected = at_75["elasticity"].sel(parameter="reference_area").item()
+    expected += at_75["table_elasticity"].sel(table=of_loads).sum().item()
+    assert at_75["grouped_factor_elasticity"].item() == pytest.approx(expected, rel=1e-9)
+
+
+def test_a_grouped_factor_is_no_parameter(as504):
+    with pytest.raises(GroupedFactorError, match="'aerodynamics' is a factor on several tables.*leave it out"):
+        as504.sensitivity("bending_moment", 75.0, parameters=["aerodynamics"])
