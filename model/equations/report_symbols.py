@@ -79,7 +79,7 @@ _PATTERNS = (
     (r"control\.T(\d)\.denominator\.s(\d+)", "", "a_{{{0},{1}}}"),
     (r"T(\d)_(\d+)", "", "x_{{T{0},{1}}}"),
     (r"T(\d)", "", "y_{{T{0}}}"),
-    (r"(\w+)\.sigma", "", r"\sigma_{{{0}}}"),
+    (r"(\w+)\.(?:sigma|standard_deviation)", "", r"\sigma_{{{0}}}"),
     (r"(\w+)\.correlation_time", "", r"\tau_{{{0}}}"),
     (r"deviation_(\w+)", "", "n_{{{0}}}"),
     (r"wind_filter\.([FGH])_(\d+)_(\d+)", "{0}[{1},{2}]", "{0}_{{{1}{2}}}"),
