@@ -13,6 +13,8 @@ from ..model.errors import IntegrationError, ParameterValueError
 from ..model.system.names import COMBINED
 from .case.case import Case
 from .case.times import end_times
+from .flight_load.load import DESIGN, DRAWS, FlightLoad, flight_load
+from .flight_load.request import Sides
 from .sensitivity.check import check_sensitivity
 from .sensitivity.many import sensitivities
 from .sensitivity.one import sensitivity
@@ -216,16 +218,20 @@ class Study(Case):
             return weighting_family(self, ends, interpreted_weighting(self.with_means, ends, spacing))
         what = "weighting functions of many end times are computed"
         chosen = engine_as(Sweep, engine_of_options(engine, options), Sweep(), what)
-        found = sweep(
-            sweep_of(self.executable),
-            self.with_means,
-            ends,
-            relative_tolerance=chosen.relative_tolerance,
-            weighting_spacing=spacing,
-            responses=(),
-        )
-        assert found.weighting is not None
-        return weighting_family(self, ends, found.weighting)
+
+        def answer() -> xr.Dataset:
+            found = sweep(
+                sweep_of(self.executable),
+                self.with_means,
+                ends,
+                relative_tolerance=chosen.relative_tolerance,
+                weighting_spacing=spacing,
+                responses=(),
+            )
+            assert found.weighting is not None
+            return weighting_family(self, ends, found.weighting)
+
+        return self.kept(("weighting functions", tuple(ends), spacing, chosen), answer).copy()
 
     def weighting_function(
         self,
@@ -264,6 +270,55 @@ class Study(Case):
         chosen = engine_as(Cvodes, engine_of_options(engine, options), Cvodes(), what)
         history = AdjointSolver(self.with_means, chosen).history(float(time), spacing)
         return weighting_dataset(self, float(time), history)
+
+    def flight_load(
+        self,
+        response: str,
+        window: tuple[float, float] | None = None,
+        probabilities: float | Iterable[float] = (DESIGN,),
+        *,
+        sides: Sides = "both",
+        draws: int = DRAWS,
+        seed: int = 0,
+    ) -> FlightLoad:
+        """Return the largest value that a response takes in a window of flight, with its odds.
+
+        Parameters
+        ----------
+        response : str
+        window : (float, float), optional
+            s; a vehicle's default times without it, the whole flight of other systems.
+        probabilities : float or iterable of float
+            For each the level that the flight's maximum passes with it. 0.00135 is the chance with which a single
+            instant passes mean + 3 sigma.
+        sides : {'both', 'upper', 'lower'}
+            Of the response's size, both sides together; of the response; or of its negative.
+        draws : int
+            Paths of the importance sampling: 2000 give a probability to some 3 %.
+        seed : int
+            The same seed gives the same numbers on every machine, to rounding.
+
+        Returns
+        -------
+        FlightLoad
+            ``level`` and its ``interval``, ``probability(value)``, ``exceedance``, ``time_of_maximum``, ``shares``.
+
+        Raises
+        ------
+        UnknownNameError, TimeRangeError, ParameterValueError, DirectNoiseError, NoVarianceError, IntegrationError
+
+        Warns
+        -----
+        SpacingWarning
+            The response moves too fast for the finest grid of times.
+
+        Notes
+        -----
+        The response over the window is a Gaussian process with the covariance R(t, s) = C(t) P(t) Phi(s, t)' C(s)'.
+        Rare passages are drawn by a mixture over times (Adler, Blanchet and Liu 2012), between points of the grid as
+        Brownian bridges where white noise reaches the response's rate.
+        """
+        return flight_load(self, response, window, probabilities, sides, draws, seed)
 
     def sensitivity(
         self,

@@ -61,7 +61,7 @@ def _difference_at(sweep: CompiledSweep, numbers: NominalNumbers, time: float) -
     sizes = np.sqrt(np.concatenate([np.einsum("sii->i", P) + m**2, variance.sum(axis=0) + response**2]))
     sizes = np.where(sizes > 0, sizes, declared_sizes(system))
     try:
-        found = sweep.integrate(numbers, segments, TOLERANCE, state, sizes, transition=True)
+        found = sweep.integrate(numbers, segments, TOLERANCE, state, sizes, steps=True)
         means, outputs, _ = sweep.mean_history(numbers, segments, TOLERANCE, sizes)
     except AscentwindError:
         return np.inf

@@ -34,7 +34,7 @@ class CompiledSweep:
         segments: Segments,
         tolerance: float,
         sizes: NDArray[np.float64] | None = None,
-        transition: bool = False,
+        steps: bool = False,
     ) -> SegmentResults:
         """Sweep over the segments.
 
@@ -47,8 +47,8 @@ class CompiledSweep:
             Of one step, relative to the size of the states.
         sizes : (n + responses,) array
             Typical sizes of states and responses; those that the system declares without it.
-        transition : bool
-            Keep the transition matrices.
+        steps : bool
+            Keep the transition matrix of every segment and what noise adds in it.
 
         Raises
         ------
@@ -57,7 +57,7 @@ class CompiledSweep:
         system, n = self.system, len(self.system.states)
         covariances = [system.start_covariance_matrix(name, executable.parameters) for name in system.sources]
         state = np.ascontiguousarray(np.array(covariances).reshape(len(system.sources), n, n))
-        return self.integrate(executable, segments, tolerance, state, sizes, transition)
+        return self.integrate(executable, segments, tolerance, state, sizes, steps)
 
     def integrate(
         self,
@@ -66,19 +66,20 @@ class CompiledSweep:
         tolerance: float,
         state: NDArray[np.float64],
         sizes: NDArray[np.float64] | None = None,
-        transition: bool = False,
+        steps: bool = False,
     ) -> SegmentResults:
         """Sweep from covariances (sources, n, n) of the states, which become those at the end; else as ``run``."""
         system = self.system
         k, n, s, r = segments.end.size, len(system.states), len(system.sources), len(system.outputs)
         covariance, mean, error = np.empty((k, s, r, r)), np.empty((k, r)), np.empty((k, s, r))
-        kept = np.empty((k, n, n)) if transition else None
+        transition = np.empty((k, n, n)) if steps else None
+        added = np.empty((k, s, n, n)) if steps else None
         counters, failure = np.zeros(3), np.zeros(2)
         given = self._arguments(executable, segments, tolerance, sizes)
-        results = (state, np.zeros(n), covariance, mean, error, kept, counters, failure)
+        results = (state, np.zeros(n), covariance, mean, error, transition, added, counters, failure)
         code = self.shared_library.call("sweep", *given, *results)
         self._check(code, failure, executable, tolerance)
-        return SegmentResults(covariance, mean, error, kept, _named(counters))
+        return SegmentResults(covariance, mean, error, transition, added, _named(counters))
 
     def mean_history(
         self,

@@ -38,6 +38,8 @@ class SegmentResults:
         Estimated relative error of the standard deviation.
     transition : (k, n, n) array or None
         Transition matrix of each segment.
+    added : (k, sources, n, n) array or None
+        Covariance of the states at the end of each segment from the noise within it.
     counters : dict
     """
 
@@ -45,4 +47,5 @@ class SegmentResults:
     mean: NDArray[np.float64]
     error: NDArray[np.float64]
     transition: NDArray[np.float64] | None
+    added: NDArray[np.float64] | None
     counters: dict[str, int]

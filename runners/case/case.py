@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Hashable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -282,6 +282,28 @@ class Case:
     def _respond(self) -> Respond:
         engine = available_sweep(self.executable)
         return mean_response if engine is None else forward_mean(engine)
+
+    @cached_property
+    def _kept(self) -> dict[Hashable, Any]:
+        return {}
+
+    def kept(self, question: Hashable, answer: Callable[[], Any]) -> Any:
+        """Return what was computed once for a question that is asked again and again, such as the weights of a flight.
+
+        Parameters
+        ----------
+        question : hashable
+        answer : callable
+            Computes it, the first time.
+
+        Returns
+        -------
+        object
+            Not to be changed.
+        """
+        if question not in self._kept:
+            self._kept[question] = answer()
+        return self._kept[question]
 
     def matrices(self, time: float) -> tuple[NDArray, NDArray, NDArray, NDArray]:
         """Return the matrices at a time; names of their rows and columns are in ``system``.

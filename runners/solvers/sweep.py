@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 
 from ...codegen.sweep.compiled import sweep_of
 from ...codegen.sweep.integrator import CompiledSweep
-from ...codegen.sweep.segments import Segments
+from ...codegen.sweep.segments import SegmentResults, Segments
 from ...codegen.system.evaluation import MatrixEvaluator
 from ...codegen.system.executable import ExecutableSystem
 from ...codegen.system.functions import state_scales
@@ -158,18 +158,13 @@ def sweep(
     system, ends = compiled.system, check_times(compiled.system, times)
     check_relative_tolerance(relative_tolerance, LEAST_TOLERANCE)
     system.refuse_direct_noise(system.output_names if responses is None else responses)
-    longest = max(LONGEST_SEGMENT, float(ends[-1] - system.start) / MOST_SEGMENTS)
+    longest = longest_segment(float(ends[-1] - system.start))
     longest = min(longest, longest_interval, weighting_spacing or longest)
     nodes = time_nodes(executable, ends)
     # an end time at the start needs no integration, only a segment to read it in
     last = nodes[-1] if nodes[-1] > system.start else min(system.end, system.start + longest)
     segments = flight_segments(executable, (*np.unique(nodes[nodes < last]).tolist(), float(last)), longest)
-    keep, sizes = weighting_spacing is not None, sizes_of_sweep(executable, float(last))
-    with naming_fastest_root(executable):
-        result = compiled.run(executable, segments, relative_tolerance, sizes, transition=keep)
-        if misjudged(sizes, result.covariance):
-            sizes = sizes_of_sweep(executable, float(last), trust=False)
-            result = compiled.run(executable, segments, relative_tolerance, sizes, transition=keep)
+    result = swept(compiled, executable, segments, relative_tolerance, steps=weighting_spacing is not None)
     at = np.where(nodes > system.start, np.searchsorted(segments.end, nodes), -1)
     found = result.covariance[at], result.mean[at], result.error[at]
     if at[0] < 0:
@@ -179,6 +174,32 @@ def sweep(
     if result.transition is not None:
         weighting = _weighting_functions(executable, segments, at, result.transition)
     return SweepResult(ends, *found, result.counters, weighting)
+
+
+def longest_segment(flight: float) -> float:
+    """Return the length (s) of the longest segment of a flight (s)."""
+    return max(LONGEST_SEGMENT, flight / MOST_SEGMENTS)
+
+
+def swept(
+    compiled: CompiledSweep, executable: ExecutableSystem, segments: Segments, tolerance: float, *, steps: bool
+) -> SegmentResults:
+    """Sweep over segments with typical sizes of the system; a second time where they turn out to be misjudged.
+
+    ``steps`` keeps what each segment does to the states.
+
+    Raises
+    ------
+    IntegrationError, DataError
+    """
+    last = float(segments.end[-1])
+    with naming_fastest_root(executable):
+        sizes = sizes_of_sweep(executable, last)
+        result = compiled.run(executable, segments, tolerance, sizes, steps=steps)
+        if misjudged(sizes, result.covariance):
+            sizes = sizes_of_sweep(executable, last, trust=False)
+            result = compiled.run(executable, segments, tolerance, sizes, steps=steps)
+    return result
 
 
 def _at_start(
@@ -387,19 +408,21 @@ def _weighting_functions(
     system = executable.system
     n, r, k, m = len(system.states), len(system.outputs), at.size, segments.end.size + 1
     times = np.concatenate([[segments.start], segments.end])
-    noise = np.zeros((k, m, r, len(system.noises)))
-    inputs = np.zeros((k, m, r, len(system.input_names)))
-    rows = np.zeros((k, r, n))
-    joins = {int(segment): int(np.argmax(at == segment)) for segment in at}  # the first of the ends of a segment
-    first = k
+    noise = np.zeros((m, k * r, len(system.noises)))
+    inputs = np.zeros((m, k * r, len(system.input_names)))
+    evaluate = MatrixEvaluator(executable, ("C", "B", "E"))
+    rows = np.zeros((k * r, n))
+    joins = {int(segment): r * int(np.argmax(at == segment)) for segment in at}  # the first of the ends of a segment
+    first = k * r
     for point in range(m - 1, -1, -1):
         segment = max(point - 1, 0)  # a point belongs to the segment that it ends: the left side of a jump
-        matrices = executable.matrices(float(times[point]), segments.low[segment], segments.high[segment])
+        C, B, E = evaluate(float(times[point]), segments.low[segment], segments.high[segment])
         if point < m - 1:
             rows[first:] = rows[first:] @ transition[point]
         if point - 1 in joins:
-            rows[joins[point - 1] : first] = matrices["C"]
+            rows[joins[point - 1] : first] = np.tile(C, ((first - joins[point - 1]) // r, 1))
             first = joins[point - 1]
-        noise[first:, point] = rows[first:] @ matrices["B"]
-        inputs[first:, point] = rows[first:] @ matrices["E"]
-    return WeightingFunctions(times, noise, inputs)
+        noise[point, first:] = rows[first:] @ B
+        inputs[point, first:] = rows[first:] @ E
+    by_end = (array.reshape(m, k, r, -1).swapaxes(0, 1) for array in (noise, inputs))
+    return WeightingFunctions(times, *by_end)

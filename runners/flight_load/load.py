@@ -1,0 +1,269 @@
+"""The load of a whole flight: the largest value of one response in a window, with its probability."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import xarray as xr
+from scipy.special import ndtri_exp
+
+from ...model.errors import ParameterValueError
+from ..case.case import Case
+from ..case.provenance import provenance
+from .crossings import Boundary
+from .probability import Estimate, Level, estimate, find_level
+from .process import OneOutput, one_output
+from .request import (
+    Sides,
+    SpacingWarning,
+    checked_draws,
+    checked_probabilities,
+    checked_sides,
+    refuse_without_variance,
+)
+from .sampling import draw_beyond
+from .window import checked_window, window_chain
+
+DESIGN = 0.00135  # 1 - Phi(3): with this chance an instant passes mean + 3 sigma
+STEPS = 2400  # of the window at first; AS-504 in 60 s: 0.025 s
+MOST_STEPS = 9600
+HALVINGS = 2  # from the grid of which paths are drawn to the one on which they are seen
+SPACING_ERROR = 0.02  # relative, of a probability; finer where it is larger
+DRAWS = 2000
+BINS = 60  # of the time of the maximum
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FlightLoad:
+    """The largest value of a response over a window of flight.
+
+    Attributes
+    ----------
+    case : Case
+    response : str
+    window : (float, float)
+        s.
+    probabilities : tuple of float
+        For which levels were asked.
+    sides : {'both', 'upper', 'lower'}
+        Whether the maximum is of the size of the response, of the response, or of its negative.
+    draws, seed, steps : int
+        Paths drawn, the seed of the draws, and steps of the window.
+    """
+
+    case: Case
+    response: str
+    window: tuple[float, float]
+    probabilities: tuple[float, ...]
+    sides: Sides
+    draws: int
+    seed: int
+    steps: int
+
+    @property
+    def unit(self) -> str:
+        """Unit of the response."""
+        return self.case.system.outputs[self.case.system.output_index(self.response)].unit
+
+    @cached_property
+    def process(self) -> OneOutput:
+        """The response as a Gaussian process over the window."""
+        return self._process(None)
+
+    def _process(self, sources: Sequence[int] | None) -> OneOutput:
+        chain = window_chain(self.case, self.window, self.steps)
+        row = self.case.system.output_index(self.response)
+        return one_output(chain, chain.output[:, row], chain.mean[:, row], HALVINGS, sources)
+
+    def _boundary(self, value: float) -> Boundary:
+        return Boundary.around(np.full(self.process.seen.mean.shape, value), self.sides)
+
+    def _random(self, *what: int) -> np.random.Generator:
+        return np.random.default_rng([self.seed, *what])
+
+    @cached_property
+    def levels(self) -> tuple[Level, ...]:
+        """What is found for every probability: level, interval, estimate, paths."""
+        return tuple(self._level(self.process, p) for p in self.probabilities)
+
+    def _level(self, process: OneOutput, probability: float) -> Level:
+        size = float((np.abs(process.drawn.mean) + process.std).max())
+        return find_level(process, probability, self._boundary, size, self._random(0), self.draws)
+
+    @cached_property
+    def level(self) -> xr.DataArray:
+        """The level that the flight's maximum passes with each probability, (probability,)."""
+        return self._array([found.value for found in self.levels], "level that the flight's maximum passes")
+
+    @cached_property
+    def interval(self) -> xr.DataArray:
+        """95 % interval of the level by its own sampling, (probability, bound)."""
+        return self._array([found.interval for found in self.levels], "95 % interval by the sampling", ("bound",))
+
+    @property
+    def spacing_error(self) -> xr.DataArray:
+        """What the grid of times still misses of each probability, relative, (probability,)."""
+        errors = [found.probability.spacing_error for found in self.levels]
+        return self._array(errors, "relative error of the probability by the grid of times", unit="1")
+
+    def probability(self, value: float) -> Estimate:
+        """Return the probability that the flight's maximum passes a value.
+
+        Parameters
+        ----------
+        value : float
+            In the unit of the response.
+
+        Returns
+        -------
+        Estimate
+            With its standard error, and bounds that cost nothing.
+
+        Raises
+        ------
+        ParameterValueError
+            The value is no finite number.
+        """
+        if not np.isfinite(value):
+            raise ParameterValueError(f"the chance of passing {value} cannot be computed; give a finite level")
+        boundary = self._boundary(float(value))
+        return estimate(draw_beyond(self.process, boundary, self._random(1), self.draws), boundary)
+
+    @cached_property
+    def exceedance(self) -> xr.DataArray:
+        """Probability of passing each level from about 0.5 down to 1e-7, (level,), with ``standard_error``."""
+        ends = [self._instant_level(np.log(p)) for p in (0.5, 1e-8)]
+        values, found, errors = np.linspace(*ends, 36), [], []
+        for number, group in enumerate(np.split(values, 6)):
+            draws = draw_beyond(self.process, self._boundary(group[0]), self._random(2, number), self.draws // 2)
+            for value in group:
+                each = draws.contributions(self._boundary(value))
+                found.append(min(float(each.mean()), 1.0))
+                errors.append(float(each.std(ddof=1) / np.sqrt(each.size)))
+        level = ("level", values, {"units": self.unit, "long_name": "level"})
+        error = ("level", np.array(errors), {"units": "1", "long_name": "standard error of the sampling"})
+        what = {"units": "1", "long_name": "probability that the flight's maximum passes the level"}
+        return xr.DataArray(
+            np.minimum.accumulate(found), {"level": level, "standard_error": error}, ("level",), "exceedance", what
+        )
+
+    def _instant_level(self, log_probability: float) -> float:
+        """Return the level that the worst instant passes with a probability."""
+        mean, away = self.process.drawn.mean, -ndtri_exp(log_probability) * self.process.std
+        sides = {"upper": mean + away, "lower": away - mean}
+        return max(float(side.max()) for name, side in sides.items() if self.sides in (name, "both"))
+
+    @cached_property
+    def time_of_maximum(self) -> xr.DataArray:
+        """Probability density of the time of the maximum, s^-1, (given, time).
+
+        ``given`` is 'any flight', or the probability of the level that is passed. A bin is a sixtieth of the window.
+        """
+        edges, times = np.linspace(*self.window, BINS + 1), self.process.seen.times
+        random = self._random(3)
+        flown = self.process.refined(self.process.deviations(random, self.draws), random) + self.process.seen.mean
+        size = {"both": np.abs(flown), "upper": flown, "lower": -flown}[self.sides][:, :, 0]
+        rows = [np.histogram(times[size.argmax(axis=1)], edges, density=True)[0]]
+        for found in self.levels:
+            weight = found.draws.places(found.boundary).sum(axis=(1, 2))
+            rows.append(np.histogram(times, edges, weights=weight, density=True)[0])
+        return xr.DataArray(
+            np.array(rows),
+            {
+                "given": ["any flight", *(f"{p:g}" for p in self.probabilities)],
+                "time": ("time", 0.5 * (edges[1:] + edges[:-1]), {"units": "s", "long_name": "flight time"}),
+            },
+            ("given", "time"),
+            "time_of_maximum",
+            {"units": "s^-1", "long_name": "probability density of the time of the maximum"},
+        )
+
+    @cached_property
+    def shares(self) -> xr.Dataset:
+        """What each source adds, over (probability, source).
+
+        ``share`` of the variance at the times at which flights pass the level, adding up to one; ``level_without`` the
+        level of a flight in which the source is silent.
+        """
+        system = self.case.system
+        chain = window_chain(self.case, self.window, self.steps)
+        row = chain.output[:, system.output_index(self.response)]
+        variance = np.einsum("mi,msij,mj->ms", row, chain.covariance, row, optimize=True)
+        share, without = [], []
+        for found in self.levels:
+            weight = found.draws.places(found.boundary).sum(axis=(1, 2))
+            at = weight > 0
+            part = variance[at] / variance[at].sum(axis=1, keepdims=True)
+            share.append(weight[at] @ part / weight[at].sum())
+        count = len(system.sources)
+        for number in range(count):
+            process = self._process([k for k in range(count) if k != number])
+            varies = float(process.std.max()) > 0
+            constant = {"both": np.abs, "upper": np.asarray, "lower": np.negative}[self.sides](process.seen.mean).max()
+            without.append([self._level(process, p).value if varies else float(constant) for p in self.probabilities])
+        dims, unit = ("probability", "source"), self.unit
+        return xr.Dataset(
+            {
+                "share": (dims, np.array(share), {"units": "1", "long_name": "share of the variance where passed"}),
+                "level_without": (dims, np.array(without).T, {"units": unit, "long_name": "level without the source"}),
+            },
+            {"probability": np.array(self.probabilities), "source": list(system.sources)},
+        )
+
+    def to_dataset(self) -> xr.Dataset:
+        """Return everything in one dataset, levels as ``level_of`` (probability,)."""
+        level, interval = self.level.rename("level_of"), self.interval.rename("interval_of")
+        found = xr.merge([level, interval, self.spacing_error.rename("spacing_error"), self.exceedance, self.shares])
+        found = found.merge(self.time_of_maximum.to_dataset())
+        return found.assign_attrs(
+            provenance(self.case)
+            | {"response": self.response, "unit": self.unit, "sides": self.sides, "window_s": list(self.window)}
+            | {"draws": self.draws, "seed": self.seed, "steps": self.steps}
+        )
+
+    def __repr__(self) -> str:
+        lines = [f"FlightLoad of {self.response} [{self.unit}], {self.window[0]:g} to {self.window[1]:g} s, {self.sides}"]
+        for p, found in zip(self.probabilities, self.levels, strict=True):
+            low, high = found.interval
+            lines.append(f"passed with {p:g}: {found.value:.5g} ({low:.5g} to {high:.5g})")
+        return "\n  ".join(lines)
+
+    def _array(
+        self, values: Iterable[object], name: str, more: tuple[str, ...] = (), unit: str | None = None
+    ) -> xr.DataArray:
+        coords: dict = {"probability": ("probability", np.array(self.probabilities), {"units": "1"})}
+        if more:
+            coords["bound"] = ["lower", "upper"]
+        attributes = {"units": unit or self.unit, "long_name": name}
+        return xr.DataArray(np.array(list(values)), coords, ("probability", *more), attrs=attributes)
+
+
+def flight_load(
+    case: Case,
+    response: str,
+    window: tuple[float, float] | None,
+    probabilities: Iterable[float],
+    sides: Sides,
+    draws: int,
+    seed: int,
+) -> FlightLoad:
+    """See :meth:`Study.flight_load`."""
+    (name,) = case.checked_responses([response])
+    checked_draws(draws, seed)
+    asked = checked_probabilities(probabilities)
+    load = FlightLoad(case, name, checked_window(case, window), asked, checked_sides(sides), draws, seed, STEPS)
+    refuse_without_variance(name, load.process)
+    while float(load.spacing_error.max()) > SPACING_ERROR and load.steps < MOST_STEPS:
+        load = replace(load, steps=2 * load.steps)
+    missed = float(load.spacing_error.max())
+    if missed > SPACING_ERROR:
+        text = (
+            f"the grid of {load.steps} steps still misses about {100 * missed:.2g} % of the probability that '{name}' "
+            "passes its level; ask for a shorter window"
+        )
+        warnings.warn(SpacingWarning(text), stacklevel=3)
+    return load

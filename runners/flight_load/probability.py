@@ -1,0 +1,149 @@
+"""Estimates with their errors: the probability of passing a boundary, and the boundary passed with a probability."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import brentq
+
+from .crossings import Boundary
+from .process import Process
+from .sampling import Draws, draw_beyond, instant_probabilities
+
+CONFIDENCE = 1.96  # standard errors of a 95 % interval
+ROUGH = 400  # draws that find about where a level lies
+ORDER = 1.5  # of the error left by the grid: between that of a smooth path, 2, and of a rough one with bridges, 1
+SOLVED = 1e-10  # relative, to which a level is solved for
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A probability, with what is not known of it.
+
+    Attributes
+    ----------
+    value : float
+    standard_error : float
+        From the number of draws.
+    spacing_error : float
+        Relative; what the grid of times still misses, estimated from half as many points.
+    largest_instant, sum_of_instants : float
+        Bounds that cost nothing: the largest probability of a single point, side and output on the grid drawn, and the
+        sum of all of them.
+    """
+
+    value: float
+    standard_error: float
+    spacing_error: float
+    largest_instant: float
+    sum_of_instants: float
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """95 % interval of the sampling."""
+        half = CONFIDENCE * self.standard_error
+        return max(0.0, self.value - half), min(1.0, self.value + half)
+
+
+def estimate(draws: Draws, boundary: Boundary) -> Estimate:
+    """Return the probability of passing a boundary from draws beyond it, or beyond one nearer."""
+    found = draws.contributions(boundary)
+    value, coarser = float(found.mean()), float(draws.coarser_contributions(boundary).mean())
+    instants = np.exp(instant_probabilities(draws.process, boundary.at(slice(None, None, draws.process.stride))))
+    return Estimate(
+        min(value, 1.0),
+        float(found.std(ddof=1) / np.sqrt(found.size)),
+        abs(value - coarser) / value / (2**ORDER - 1) if value > 0 else 0.0,
+        float(instants.max()),
+        float(instants.sum()),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Level:
+    """A number on which a boundary depends, chosen so that it is passed with a probability.
+
+    Attributes
+    ----------
+    value : float
+    interval : (float, float)
+        95 %, of the sampling.
+    boundary : Boundary
+    probability : Estimate
+        Of passing it.
+    slope : float
+        -d ln P / d value.
+    draws : Draws
+        Of paths beyond that boundary, or one a little nearer.
+    """
+
+    value: float
+    interval: tuple[float, float]
+    boundary: Boundary
+    probability: Estimate
+    slope: float
+    draws: Draws
+
+
+def find_level(
+    process: Process,
+    probability: float,
+    boundary_of: Callable[[float], Boundary],
+    size: float,
+    random: np.random.Generator,
+    count: int,
+) -> Level:
+    """Return the number whose boundary is passed with a probability.
+
+    Parameters
+    ----------
+    process : Process
+    probability : float
+    boundary_of : callable
+        Boundary on the grid seen, farther out for larger numbers.
+    size : float
+        Typical size of the number.
+    random : Generator
+    count : int
+        Draws.
+    """
+
+    def instant(u: float) -> float:
+        at = boundary_of(u).at(slice(None, None, process.stride))
+        return float(instant_probabilities(process, at).max()) - np.log(probability)
+
+    low, high = -size, 2 * size
+    while instant(low) < 0:
+        low -= 2 * size
+    while instant(high) > 0:
+        high += 2 * size
+    # a path passes more often than its worst instant: the number lies above the one found from that
+    near = float(brentq(instant, low, high, xtol=SOLVED * size))
+    step = 0.02 * size
+    rough, _ = _solve(draw_beyond(process, boundary_of(near), random, ROUGH), probability, boundary_of, near, step)
+    start = max(near, rough - step)
+    draws = draw_beyond(process, boundary_of(start), random, count)
+    value, slope = _solve(draws, probability, boundary_of, start, step)
+    boundary = boundary_of(value)
+    found = estimate(draws, boundary)
+    half = CONFIDENCE * found.standard_error / probability / slope if slope > 0 else 0.0
+    return Level(value, (value - half, value + half), boundary, found, slope, draws)
+
+
+def _solve(
+    draws: Draws, probability: float, boundary_of: Callable[[float], Boundary], low: float, step: float
+) -> tuple[float, float]:
+    """Return the number and -d ln P / d number there."""
+
+    def excess(u: float) -> float:
+        return float(np.log(max(draws.contributions(boundary_of(u)).mean(), 1e-300) / probability))
+
+    value = low
+    if excess(low) > 0:
+        high = low + step
+        while excess(high) > 0:
+            low, high = high, high + step
+        value = float(brentq(excess, low, high, xtol=SOLVED * step))
+    return value, (excess(value) - excess(value + 0.1 * step)) / (0.1 * step)

@@ -1,0 +1,376 @@
+"""Outputs over a window of flight as a Gaussian process on a grid, from which paths are drawn.
+
+Two forms of the same: one output by its covariance between all times, of which one factor gives any number of paths;
+many outputs, such as the loads of all stations, by the states, which are few, and never by a matrix of stations and
+times.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..solvers.discretisation import symmetric_root
+from ..solvers.markov_chain import MarkovChain
+
+NEIGHBOURS = 8  # old points that a new one between them is drawn from
+SEVERAL = 5.0  # standard deviations that a path may go between two points
+JITTER = (1e-14, 1e-13, 1e-12, 1e-11, 1e-10, 1e-9)  # of a variance; what a factor of a smooth process needs
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """Points of time, and what is known of r outputs there.
+
+    Attributes
+    ----------
+    times : (m,) array
+        s.
+    mean : (m, r) array
+    diffusion : (m, r) array
+        What white noise does to an output directly, output unit s^-1/2; its sign tells which outputs it moves the same
+        way. Zero where an output is differentiable.
+    """
+
+    times: NDArray[np.float64]
+    mean: NDArray[np.float64]
+    diffusion: NDArray[np.float64]
+
+
+class Process(Protocol):
+    """r outputs on a grid of which paths are drawn, and on a finer one on which they are seen.
+
+    Attributes
+    ----------
+    drawn, seen : Grid
+    std : (m, r) array
+        Standard deviation at the points drawn.
+    between : (m, r) array
+        How far a path goes between two points drawn without being seen at either: a few of its standard deviations
+        there, given both.
+    stride : int
+        Steps of the grid seen in one of the grid drawn.
+    """
+
+    @property
+    def drawn(self) -> Grid: ...
+    @property
+    def seen(self) -> Grid: ...
+    @property
+    def std(self) -> NDArray[np.float64]: ...
+    @property
+    def between(self) -> NDArray[np.float64]: ...
+    @property
+    def stride(self) -> int: ...
+
+    def deviations(self, random: np.random.Generator, count: int) -> NDArray[np.float64]:
+        """Return drawn deviations from the mean, (count, m, r)."""
+        ...
+
+    def covariances(self, points: NDArray[np.intp], outputs: NDArray[np.intp]) -> NDArray[np.float64]:
+        """Return covariances of everything with chosen outputs at chosen points, (len(points), m, r)."""
+        ...
+
+    def refined(self, deviations: NDArray[np.float64], random: np.random.Generator) -> NDArray[np.float64]:
+        """Return drawn deviations, conditioned or not, with what lies between their points: on the finer grid."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Halving:
+    """New points in the middle between old ones, each given its nearest old ones.
+
+    Attributes
+    ----------
+    neighbours : (k, 8) array of int
+        Old points.
+    weight : (k, 8) array
+        Of the deviations there.
+    spread : (k,) array
+        Standard deviation that remains.
+    """
+
+    neighbours: NDArray[np.intp]
+    weight: NDArray[np.float64]
+    spread: NDArray[np.float64]
+
+    def add_expected(self, old: NDArray[np.float64], middle: NDArray[np.float64]) -> None:
+        """Add what deviations at old points (count, k + 1) let expect to those of the new ones (count, k)."""
+        k, count = self.neighbours.shape
+        moved = np.flatnonzero(self.neighbours[:, 0] == np.arange(k) + 1 - count // 2)  # not at either end
+        begin, end = (int(moved[0]), int(moved[-1]) + 1) if moved.size else (0, 0)
+        for j in range(count if moved.size else 0):
+            first = int(self.neighbours[begin, j])
+            middle[:, begin:end] += old[:, first : first + end - begin] * self.weight[begin:end, j]
+        for i in (*range(begin), *range(end, k)):
+            middle[:, i] += old[:, self.neighbours[i]] @ self.weight[i]
+
+
+@dataclass(frozen=True, eq=False)
+class OneOutput:
+    """One output, by its covariance R between all points drawn; between them by a few neighbours.
+
+    Attributes
+    ----------
+    drawn, seen : Grid
+    covariance : (m, m) array
+        R.
+    halvings : tuple of Halving
+        From the grid drawn to the grid seen.
+    between : (m, 1) array
+    """
+
+    drawn: Grid
+    seen: Grid
+    covariance: NDArray[np.float64]
+    halvings: tuple[Halving, ...]
+    between: NDArray[np.float64]
+
+    @cached_property
+    def std(self) -> NDArray[np.float64]:
+        return np.sqrt(np.maximum(np.diagonal(self.covariance), 0.0))[:, None]
+
+    @property
+    def stride(self) -> int:
+        return 2 ** len(self.halvings)
+
+    @cached_property
+    def _factor(self) -> NDArray[np.float64]:
+        """The lower factor L of R = L L', zero where nothing varies."""
+        varies = np.flatnonzero(self.std[:, 0] > 0)
+        std = self.std[varies, 0]
+        correlation = self.covariance[np.ix_(varies, varies)] / np.outer(std, std)
+        factor = np.zeros_like(self.covariance)
+        for jitter in JITTER:
+            try:
+                root = np.linalg.cholesky(correlation + jitter * np.eye(varies.size))
+            except np.linalg.LinAlgError:
+                continue
+            factor[np.ix_(varies, varies)] = std[:, None] * root
+            return factor
+        values, vectors = np.linalg.eigh(correlation)
+        factor[np.ix_(varies, varies)] = std[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
+        return factor
+
+    def deviations(self, random: np.random.Generator, count: int) -> NDArray[np.float64]:
+        return (random.standard_normal((count, self.drawn.times.size)) @ self._factor.T)[:, :, None]
+
+    def covariances(self, points: NDArray[np.intp], outputs: NDArray[np.intp]) -> NDArray[np.float64]:
+        return self.covariance[points][:, :, None]
+
+    def refined(self, deviations: NDArray[np.float64], random: np.random.Generator) -> NDArray[np.float64]:
+        found = deviations[:, :, 0]
+        for halving in self.halvings:
+            middle = random.standard_normal((len(found), halving.spread.size))
+            middle *= halving.spread
+            halving.add_expected(found, middle)
+            finer = np.empty((len(found), found.shape[1] + middle.shape[1]))
+            finer[:, ::2], finer[:, 1::2] = found, middle
+            found = finer
+        return found[:, :, None]
+
+
+def one_output(
+    chain: MarkovChain,
+    row: NDArray[np.float64],
+    mean: NDArray[np.float64],
+    halvings: int = 0,
+    sources: Sequence[int] | None = None,
+) -> OneOutput:
+    """Return the process of one output of a chain.
+
+    Parameters
+    ----------
+    chain : MarkovChain
+        At (m - 1) 2^halvings + 1 times.
+    row : (m', n) array
+        Of the output over the states, at the times of the chain.
+    mean : (m',) array
+    halvings : int
+        How often the grid drawn is halved to the grid of the chain.
+    sources : sequence of int, optional
+        Numbers of those that act; all without it.
+    """
+    acting = slice(None) if sources is None else list(sources)
+    P = chain.covariance[:, acting].sum(axis=1)
+    seen = Grid(chain.times, mean[:, None], _diffusion(row[:, None] @ chain.noise_matrix))
+    stride = 2**halvings
+    at = slice(None, None, stride)
+    drawn = Grid(seen.times[at], seen.mean[at], seen.diffusion[at])
+    m, n = drawn.times.size, row.shape[1]
+    columns = np.zeros((n, m))  # Phi(t_k, t_j) P(t_j) C(t_j)' for all j up to k
+    R = np.zeros((m, m))
+    for k in range(m):
+        if k:
+            Phi = chain.transition[(k - 1) * stride]
+            for further in chain.transition[(k - 1) * stride + 1 : k * stride]:
+                Phi = further @ Phi
+            columns[:, :k] = Phi @ columns[:, :k]
+        columns[:, k] = P[k * stride] @ row[k * stride]
+        R[k, : k + 1] = row[k * stride] @ columns[:, : k + 1]
+        R[: k + 1, k] = R[k, : k + 1]
+    found = []
+    if halvings:
+        band = _band(chain, row, P, (2 * NEIGHBOURS - 1) * stride)
+        found = [_halving(band, stride // 2**k) for k in range(halvings)]
+    middle = (R[1:-1, :][:, 1:-1], R[:-2, :][:, 2:], R[2:, :][:, 1:-1], R[:-2, :][:, 1:-1])
+    own, across, after, before = (np.diagonal(x) for x in middle)
+    ends = np.diagonal(R)
+    unseen = own + 0.25 * (ends[:-2] + ends[2:]) + 0.5 * across - after - before  # of a point given its neighbours
+    between = np.zeros(m)
+    if m > 2:
+        between[1:-1] = SEVERAL * np.sqrt(np.maximum(unseen, 0.0) / 2)
+        between[0], between[-1] = between[1], between[-2]
+    return OneOutput(drawn, seen, R, tuple(found), between[:, None])
+
+
+def _band(
+    chain: MarkovChain, row: NDArray[np.float64], P: NDArray[np.float64], width: int
+) -> NDArray[np.float64]:
+    """Return R(t_i, t_{i - l}) for l = 0 ... width - 1, (m, width); zero before the first time."""
+    m, n = row.shape
+    band = np.zeros((m, width))
+    columns = np.zeros((n, width))
+    for i in range(m):
+        if i:
+            columns[:, 1:] = chain.transition[i - 1] @ columns[:, :-1]
+        columns[:, 0] = P[i] @ row[i]
+        band[i] = row[i] @ columns
+    return band
+
+
+def _halving(band: NDArray[np.float64], stride: int) -> Halving:
+    """Return how points in the middle of a grid, each ``stride`` points of the band apart, follow from that grid."""
+    last = (len(band) - 1) // stride  # number of the last old point
+    count = min(NEIGHBOURS, last + 1)
+    first = np.clip(np.arange(last) + 1 - count // 2, 0, last + 1 - count)
+    neighbours = first[:, None] + np.arange(count)
+    middle = stride * np.arange(last) + stride // 2
+
+    def covariance(i: NDArray, j: NDArray) -> NDArray[np.float64]:
+        later = np.maximum(i, j)
+        return band[later, later - np.minimum(i, j)]
+
+    old = stride * neighbours
+    K = covariance(old[:, :, None], old[:, None, :])
+    k = covariance(middle[:, None], old)
+    own = band[middle, 0]
+    size = np.sqrt(np.maximum(np.einsum("mii->mi", K), 0.0))
+    unit = np.where(size > 0, size, 1.0)
+    correlation = K / (unit[:, :, None] * unit[:, None, :])
+    correlation[:, np.arange(count), np.arange(count)] = 1.0 + JITTER[-2]
+    weight = np.linalg.solve(correlation, (k / unit)[:, :, None])[:, :, 0] / unit
+    remains = own - (weight * k).sum(axis=1)
+    return Halving(neighbours, weight, np.sqrt(np.maximum(remains, 0.0)))
+
+
+def _diffusion(direct: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return sizes of C B (m, r, noises) with the sign of their largest entry, (m, r)."""
+    size = np.sqrt((direct**2).sum(axis=2))
+    if not direct.shape[2]:
+        return size
+    largest = np.take_along_axis(direct, np.abs(direct).argmax(axis=2)[..., None], axis=2)[..., 0]
+    return np.where(largest < 0, -size, size)
+
+
+@dataclass(frozen=True, eq=False)
+class ManyOutputs:
+    """Many outputs of one chain, by its states.
+
+    Attributes
+    ----------
+    chain : MarkovChain
+    row : (m, r, n) array
+    mean : (m, r) array
+    """
+
+    chain: MarkovChain
+    row: NDArray[np.float64]
+    mean: NDArray[np.float64]
+
+    @cached_property
+    def drawn(self) -> Grid:
+        return Grid(self.chain.times, self.mean, _diffusion(self.row @ self.chain.noise_matrix))
+
+    @property
+    def seen(self) -> Grid:
+        return self.drawn
+
+    @property
+    def stride(self) -> int:
+        return 1
+
+    @cached_property
+    def between(self) -> NDArray[np.float64]:
+        step = np.sqrt(np.max(np.diff(self.chain.times)))
+        return SEVERAL / 2 * np.abs(self.drawn.diffusion) * step
+
+    @cached_property
+    def _scale(self) -> NDArray[np.float64]:
+        """The largest standard deviation of every state; states are drawn relative to it."""
+        size = np.sqrt(np.maximum(np.einsum("mii->mi", self._P), 0.0)).max(axis=0)
+        return np.where(size > 0, size, 1.0)
+
+    @cached_property
+    def _P(self) -> NDArray[np.float64]:
+        return self.chain.covariance.sum(axis=1)
+
+    @cached_property
+    def std(self) -> NDArray[np.float64]:
+        return np.sqrt(np.maximum(np.einsum("mri,mij,mrj->mr", self.row, self._P, self.row, optimize=True), 0.0))
+
+    @cached_property
+    def _roots(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Roots of the covariance at the start and of what noise adds in each step."""
+        return symmetric_root(self._P[0]), symmetric_root(self.chain.added.sum(axis=1))
+
+    @cached_property
+    def _rows_on_scale(self) -> NDArray[np.float64]:
+        return np.ascontiguousarray((self.row * self._scale).swapaxes(1, 2))
+
+    def deviations(self, random: np.random.Generator, count: int) -> NDArray[np.float64]:
+        first, roots = self._roots
+        m, _, n = self.row.shape
+        states = np.empty((m, count, n))
+        states[0] = random.standard_normal((count, n)) @ first.T
+        for k, Phi in enumerate(self.chain.transition):
+            states[k + 1] = states[k] @ Phi.T + random.standard_normal((count, n)) @ roots[k].T
+        return self._seen(states)
+
+    def covariances(self, points: NDArray[np.intp], outputs: NDArray[np.intp]) -> NDArray[np.float64]:
+        m, _, n = self.row.shape
+        count = points.size
+        states = np.zeros((m, count, n))
+        order = np.argsort(points, kind="stable")
+        at = points[order]
+        rows = self.row[at, outputs[order]]  # C(t_j), the rows that each draw is about
+        begun = np.searchsorted(at, np.arange(m + 1))  # draws whose point is before each time
+        forward = np.zeros((count, n))
+        for k in range(m):
+            if k:
+                forward[: begun[k]] = forward[: begun[k]] @ self.chain.transition[k - 1].T
+            new = slice(begun[k], begun[k + 1])
+            forward[new] = rows[new] @ self._P[k]
+            states[k, : begun[k + 1]] = forward[: begun[k + 1]]
+        backward = np.zeros((count, n))  # Phi(t_j, t_k)' C(t_j)'
+        for k in range(m - 1, -1, -1):
+            if k < m - 1:
+                backward[begun[k + 1] :] = backward[begun[k + 1] :] @ self.chain.transition[k]
+                states[k, begun[k + 1] :] = backward[begun[k + 1] :] @ self._P[k]
+            new = slice(begun[k], begun[k + 1])
+            backward[new] = rows[new]
+        found = np.empty((count, m, self.row.shape[1]))
+        found[order] = self._seen(states)
+        return found
+
+    def refined(self, deviations: NDArray[np.float64], random: np.random.Generator) -> NDArray[np.float64]:
+        return deviations
+
+    def _seen(self, states: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return outputs (count, m, r) of states (m, count, n)."""
+        return np.ascontiguousarray((states / self._scale @ self._rows_on_scale).swapaxes(0, 1))

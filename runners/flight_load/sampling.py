@@ -1,0 +1,125 @@
+"""Probabilities that a Gaussian process passes a boundary, by importance sampling.
+
+A mixture over times, outputs and sides: draw one of them with probability p_j / S, p_j its own probability of being
+beyond the boundary and S their sum; draw its value from its law beyond the boundary, the rest of the path given that
+value; the estimate is S over the number of places where the path is beyond (Adler, Blanchet and Liu, Efficient Monte
+Carlo for high excursions of Gaussian random fields, Annals of Applied Probability 22, 2012). It is unbiased, has
+nothing to tune, and costs the same for p = 1e-6 as for 1e-3. Because a path may pass between two points and be beyond
+at none, paths are drawn beyond a boundary drawn in by a few standard deviations of what lies between points, and each
+counts with the probability that it passes the true one (:mod:`crossings`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import log_ndtr, logsumexp, ndtri_exp
+
+from .crossings import Boundary, Sightings, sightings
+from .process import Process
+
+MEMORY = 2e7  # numbers in an array of paths at a time
+
+
+@dataclass(frozen=True, eq=False)
+class Draws:
+    """Paths drawn beyond a boundary: where they come near it, and their weights.
+
+    Attributes
+    ----------
+    process : Process
+    weight : (count,) array
+        S over the number of places beyond the drawn-in boundary.
+    near, coarser : Sightings
+        On the grid seen, and on every second point of it.
+    """
+
+    process: Process
+    weight: NDArray[np.float64]
+    near: Sightings
+    coarser: Sightings
+
+    def contributions(self, boundary: Boundary) -> NDArray[np.float64]:
+        """Return what each draw adds to the probability of passing a boundary, whose mean is the estimate, (count,).
+
+        The boundary lies nowhere inside the one drawn for.
+        """
+        return self.weight * self.near.passed(boundary)
+
+    def coarser_contributions(self, boundary: Boundary) -> NDArray[np.float64]:
+        """Return the same by looking at every second point only."""
+        return self.weight * self.coarser.passed(boundary.at(slice(None, None, 2)))
+
+    def places(self, boundary: Boundary) -> NDArray[np.float64]:
+        """Return how the probability of passing falls on points, outputs and sides, each path where it is worst.
+
+        Returns
+        -------
+        (m, r, 2) array
+        """
+        found = np.zeros((*boundary.upper.shape, 2))
+        path, *place = self.near.worst(boundary)
+        np.add.at(found, tuple(place), self.contributions(boundary)[path])
+        return found / self.weight.size
+
+
+def instant_probabilities(process: Process, boundary: Boundary) -> NDArray[np.float64]:
+    """Return the logarithm of the probability of being beyond a boundary on the grid drawn, (2 sides, m, r)."""
+    std, mean = process.std, process.drawn.mean
+    beyond = np.stack([mean - boundary.upper, boundary.lower - mean])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        deviate = beyond / std
+    # without spread an output is beyond or not
+    return np.where(std > 0, log_ndtr(np.where(std > 0, deviate, 0.0)), np.where(beyond > 0, 0.0, -np.inf))
+
+
+def draw_beyond(process: Process, boundary: Boundary, random: np.random.Generator, count: int) -> Draws:
+    """Draw paths beyond a boundary, in parts that fit into memory.
+
+    Parameters
+    ----------
+    process : Process
+    boundary : Boundary
+        On the grid seen.
+    random : Generator
+    count : int
+    """
+    m, r = process.seen.mean.shape
+    largest = max(16, int(MEMORY / (m * r)))
+    weights, near, coarser = [], [], []
+    while count > 0:
+        paths, weight = _paths_beyond(process, boundary, random, min(count, largest))
+        weights.append(weight)
+        near.append(sightings(paths, boundary, process.seen))
+        coarser.append(sightings(paths, boundary, process.seen, every=2))
+        count -= len(weight)
+    return Draws(process, np.concatenate(weights), Sightings.joined(near), Sightings.joined(coarser))
+
+
+def _paths_beyond(
+    process: Process, boundary: Boundary, random: np.random.Generator, count: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return paths (count, m, r) on the grid seen and their weights."""
+    inner = boundary.at(slice(None, None, process.stride)).drawn_in(process.between)
+    log_p = instant_probabilities(process, inner)
+    log_sum = float(logsumexp(log_p))
+    deviations = process.deviations(random, count)
+    if not np.isfinite(log_sum):  # nothing ever comes near
+        return process.seen.mean + process.refined(deviations, random), np.zeros(count)
+    cumulative = np.cumsum(np.exp(log_p - log_sum).ravel())
+    spread = (np.arange(count) + random.random(count)) / count * cumulative[-1]
+    chosen = np.minimum(np.searchsorted(cumulative, spread, side="right"), cumulative.size - 1)
+    sides, points, outputs = np.unravel_index(chosen, log_p.shape)
+    tail = log_p[sides, points, outputs]
+    deviate = -ndtri_exp(tail + np.log1p(-random.random(count)))  # standard, beyond the boundary on its side
+    std = process.std[points, outputs]
+    wanted = np.where(sides == 0, 1.0, -1.0) * deviate * std
+    own = deviations[np.arange(count), points, outputs]
+    gain = np.divide(wanted - own, std**2, out=np.zeros(count), where=std > 0)
+    deviations += gain[:, None, None] * process.covariances(points, outputs)
+    drawn = process.drawn.mean + deviations
+    number = (drawn > inner.upper).sum(axis=(1, 2)) + (drawn < inner.lower).sum(axis=(1, 2))
+    weight = np.exp(log_sum - np.log(np.maximum(number, 1)))
+    return process.seen.mean + process.refined(deviations, random), weight

@@ -1,0 +1,60 @@
+"""The window of flight that a load is the largest of, and the chain of states over it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...model.errors import TimeRangeError
+from ..case.case import Case
+from ..case.times import parse_times, seconds
+from ..solvers.markov_chain import MarkovChain, chain_by_exact_steps, chain_by_sweep
+from ..solvers.sweep import available_sweep
+from ..solvers.time_nodes import time_nodes
+
+TOLERANCE = 1e-6  # relative, of the sweep
+SUBSTEP = 0.01  # s, of exact steps where nothing is compiled
+
+
+def checked_window(case: Case, window: tuple[float, float] | None) -> tuple[float, float]:
+    """Return a window of flight, s: the vehicle's default times without one, the whole flight of other systems.
+
+    Raises
+    ------
+    TimeRangeError
+        It does not lie on the flight, ends before it begins, or a system without an end needs one.
+    """
+    if window is None:
+        if case.vehicle is not None:
+            times = parse_times(case.vehicle.file.default_times)
+            window = times[0], times[-1]
+        else:
+            window = case.system.start, case.system.end
+    if isinstance(window, str) or np.ndim(window) != 1 or len(window) != 2:
+        raise TimeRangeError(f"a window is two times in seconds, such as (40.0, 100.0), and {window!r} is not")
+    begin, end = (seconds(time) for time in window)
+    if not np.isfinite(end) and case.vehicle is None:
+        raise TimeRangeError("the system has no end: give a window, such as window=(0.0, 100.0)")
+    case.checked_times([begin, end])
+    if not end > begin:
+        raise TimeRangeError(f"the window ends at {end:g} s, not after its begin at {begin:g} s")
+    return begin, end
+
+
+def window_chain(case: Case, window: tuple[float, float], steps: int) -> MarkovChain:
+    """Return the states of a case as a chain over a window cut into equal steps; kept with the case.
+
+    Raises
+    ------
+    IntegrationError, DataError
+    """
+    return case.kept(("chain", window, steps), lambda: _chain(case, np.linspace(*window, steps + 1)))
+
+
+def _chain(case: Case, times: NDArray[np.float64]) -> MarkovChain:
+    executable = case.with_means
+    nodes = np.unique(time_nodes(executable, times))
+    engine = available_sweep(case.executable)
+    if engine is None:
+        return chain_by_exact_steps(executable, nodes, SUBSTEP)
+    return chain_by_sweep(engine, executable, nodes, TOLERANCE)
