@@ -1,0 +1,169 @@
+"""Limits of responses as people state them: over time, over stations of the structure, or over both."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ...model.errors import DataError, DataErrorCollector, TimeRangeError, UnknownNameError, suggestion
+from ...model.files.csv_table import CsvTable, read_csv_table, read_rows
+
+TIME, STATION = "time", "station"
+ARGUMENTS = {TIME: "s", STATION: "m"}
+
+
+class LimitError(DataError):
+    """A limit cannot be used for what it is asked for."""
+
+
+@dataclass(frozen=True, eq=False)
+class Limits:
+    """What the size of responses may not pass.
+
+    Attributes
+    ----------
+    time : (k,) array or None
+        s, increasing; None where the limits hold at all times.
+    station : (n,) array or None
+        Vehicle stations, m, increasing; None where they are of the responses themselves.
+    values : dict of str to (k, n) array
+        By response, in its SI unit, positive; k or n is one where there is no time or no station.
+    units : dict of str to str
+    file : Path or None
+        Where they were read.
+    """
+
+    time: NDArray[np.float64] | None
+    station: NDArray[np.float64] | None
+    values: dict[str, NDArray[np.float64]]
+    units: dict[str, str]
+    file: Path | None = None
+
+    def __post_init__(self):
+        for axis, points in ((TIME, self.time), (STATION, self.station)):
+            if points is None:
+                continue
+            if points.ndim != 1 or points.size < 2 or not (np.diff(points) > 0).all():
+                raise LimitError(f"a limit over {axis} needs two values of it or more, increasing", file=self.file)
+        shape = tuple(1 if points is None else points.size for points in (self.time, self.station))
+        if not self.values:
+            raise LimitError("holds no limit; add a column such as 'bending_moment [N m]'", file=self.file)
+        for name, values in self.values.items():
+            if values.shape != shape:
+                raise LimitError(f"has shape {values.shape}, expected {shape}", file=self.file, column=name)
+            if not (values > 0).all():  # NaN too
+                raise LimitError(
+                    f"{values[~(values > 0)][0]:g} is no limit of a size; give positive values", file=self.file, column=name
+                )
+
+    @staticmethod
+    def read(file: str | Path) -> Limits:
+        """Read limits from CSV.
+
+        Parameters
+        ----------
+        file : str or path
+            Columns ``time [s]``, ``station [m]`` or both, then one a response with its SI unit, such as
+            ``bending_moment [N m]``: the limit of its size. With both, every time has the same stations. Linear
+            between rows, refused outside them.
+
+        Returns
+        -------
+        Limits
+
+        Raises
+        ------
+        DataError
+        """
+        file = Path(file)
+        rows = read_rows(file)
+        if not rows:
+            raise LimitError("is empty; begin with a header such as 'time [s],bending_moment [N m]'", file=file)
+        header = [cell.partition("[")[0].strip() for cell in rows[0][1]]
+        axes = [axis for axis in ARGUMENTS if axis in header]
+        if not axes:
+            raise LimitError(
+                f"has neither a column 'time [s]' nor 'station [m]'{suggestion(header[0], ARGUMENTS)}", file=file
+            )
+        first = axes[0]
+        table = read_csv_table(file, first, ARGUMENTS[first], order="increasing" if len(axes) == 1 else "not decreasing")
+        points: dict[str, NDArray[np.float64]] = {a: np.unique(table.column(a, ARGUMENTS[a])) for a in axes}
+        names = [name for name in table.columns if name not in ARGUMENTS]
+        shape = tuple(points[axis].size if axis in points else 1 for axis in ARGUMENTS)
+        if len(axes) == 2:
+            _refuse_gaps(table, points)
+        return Limits(
+            points.get(TIME),
+            points.get(STATION),
+            {name: table.columns[name].reshape(shape) for name in names},
+            {name: table.units[name] for name in names},
+            file,
+        )
+
+    @staticmethod
+    def constant(value: float, response: str, unit: str) -> Limits:
+        """Return one limit of one response that holds at all times, in its SI unit."""
+        return Limits(None, None, {response: np.array([[float(value)]])}, {response: unit})
+
+    @staticmethod
+    def over_time(time: ArrayLike, values: Mapping[str, ArrayLike], units: Mapping[str, str]) -> Limits:
+        """Return limits over time (s), by response, in their SI units."""
+        columns = {name: np.asarray(column, float).reshape(-1, 1) for name, column in values.items()}
+        return Limits(np.asarray(time, float), None, columns, dict(units))
+
+    def of(self, response: str, unit: str, times: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the limit of a response at times (s) and, where they are over stations, at their stations.
+
+        Returns
+        -------
+        (m, n) array
+            n is one without stations.
+
+        Raises
+        ------
+        UnknownNameError, LimitError, TimeRangeError
+            There is no limit of the response, it is in another unit, or it ends before the times do.
+        """
+        if response not in self.values:
+            raise UnknownNameError("limit of response", response, self.values)
+        if self.units[response] != unit:
+            raise LimitError(
+                f"unit is [{self.units[response]}], expected [{unit}]; convert the values and the header",
+                file=self.file,
+                column=response,
+            )
+        values = self.values[response]
+        if self.time is None:
+            return np.repeat(values, times.size, axis=0)
+        if times[0] < self.time[0] or times[-1] > self.time[-1]:
+            where = f"{self.file}: " if self.file else ""
+            raise TimeRangeError(
+                f"{where}the limit of '{response}' is given from {self.time[0]:g} to {self.time[-1]:g} s and asked for "
+                f"from {times[0]:g} to {times[-1]:g} s; add rows or ask for a shorter window"
+            )
+        return np.stack([np.interp(times, self.time, column) for column in values.T], axis=1)
+
+
+def _refuse_gaps(table: CsvTable, points: dict[str, NDArray[np.float64]]) -> None:
+    """Raise unless every time has every station, in order."""
+    times, stations = points[TIME], points[STATION]
+    found = list(zip(table.columns[TIME].tolist(), table.columns[STATION].tolist(), strict=True))
+    wanted = [(float(t), float(s)) for t in times for s in stations]
+    if found == wanted:
+        return
+    collector = DataErrorCollector()
+    for time, station in sorted(set(wanted) - set(found))[:20]:
+        why = f"has no limit for station {station:g} m; every time needs the same stations"
+        collector.errors.append(LimitError(why, file=table.file, column=STATION, time=time))
+    seen: set[tuple[float, float]] = set()
+    for number, pair in enumerate(found):
+        if pair in seen:
+            why = f"station {pair[1]:g} m stands twice at one time; keep one row"
+            collector.errors.append(LimitError(why, file=table.file, row=table.lines[number], time=pair[0]))
+        seen.add(pair)
+    collector.raise_all()
+    raise LimitError("stations are not in increasing order at every time; sort the rows", file=table.file)
