@@ -18,6 +18,7 @@ FLOORS = (
     ("runners.case", "runners.wind", "runners.construct"),
     ("runners.statistics",),
     ("runners.sensitivity",),
+    ("runners.flight_load",),
     ("runners.study",),
     ("runners.design", "runners.parameter_study", "runners.views"),
     ("runners.reproduction",),

@@ -15,6 +15,7 @@ from ...model.errors import ParameterValueError
 from ..case.case import Case
 from ..case.provenance import provenance
 from .crossings import Boundary
+from .pathwise import Movement, movement
 from .probability import Estimate, Level, estimate, find_level
 from .process import OneOutput, one_output
 from .request import (
@@ -34,6 +35,7 @@ MOST_STEPS = 9600
 HALVINGS = 2  # from the grid of which paths are drawn to the one on which they are seen
 SPACING_ERROR = 0.02  # relative, of a probability; finer where it is larger
 DRAWS = 2000
+MOVED = 8000  # draws of paths that just reach a level, of which derivatives are made
 BINS = 60  # of the time of the maximum
 
 
@@ -133,6 +135,20 @@ class FlightLoad:
         boundary = self._boundary(float(value))
         return estimate(draw_beyond(self.process, boundary, self._random(1), self.draws), boundary)
 
+    def number_of(self, probability: float | None) -> int:
+        """Return the number of a probability among those asked for; of the first for None.
+
+        Raises
+        ------
+        ParameterValueError
+        """
+        if probability is None:
+            return 0
+        if probability not in self.probabilities:
+            known = ", ".join(f"{p:g}" for p in self.probabilities)
+            raise ParameterValueError(f"no level was asked for with probability {probability:g}; known: {known}")
+        return self.probabilities.index(probability)
+
     @cached_property
     def exceedance(self) -> xr.DataArray:
         """Probability of passing each level from about 0.5 down to 1e-7, (level,), with ``standard_error``."""
@@ -182,24 +198,48 @@ class FlightLoad:
             {"units": "s^-1", "long_name": "probability density of the time of the maximum"},
         )
 
+    def movement(self, which: int) -> Movement:
+        """Return how the level of a probability, by its number, moves with mean and covariance of the response."""
+        return movement(self.process, self.levels[which], self._random(4, which), MOVED)
+
+    def sensitivity(self, probability: float | None = None, parameters: Iterable[str] | None = None) -> xr.Dataset:
+        """Return derivatives of a level by parameters.
+
+        Parameters
+        ----------
+        probability : float, optional
+            One of those asked for; the first without it.
+        parameters : iterable of str, optional
+            The dozen that lead without it.
+
+        Returns
+        -------
+        xarray.Dataset
+            Over (parameter), largest first: ``derivative``, level unit per parameter unit; ``elasticity``;
+            ``envelope_elasticity``, what mean and sigma at the times of passing alone would say.
+
+        Raises
+        ------
+        ParameterValueError, UnknownNameError, StructuralParameterError
+        """
+        from .sensitivity import level_sensitivity
+
+        return level_sensitivity(self, probability, parameters)
+
     @cached_property
     def shares(self) -> xr.Dataset:
         """What each source adds, over (probability, source).
 
-        ``share`` of the variance at the times at which flights pass the level, adding up to one; ``level_without`` the
-        level of a flight in which the source is silent.
+        ``share`` of what paths that just reach the level are away from the mean there, adding up to one; fast sources
+        have more of it than of the variance. ``level_without`` the level of a flight in which the source is silent.
         """
-        system = self.case.system
-        chain = window_chain(self.case, self.window, self.steps)
-        row = chain.output[:, system.output_index(self.response)]
-        variance = np.einsum("mi,msij,mj->ms", row, chain.covariance, row, optimize=True)
-        share, without = [], []
-        for found in self.levels:
-            weight = found.draws.places(found.boundary).sum(axis=(1, 2))
-            at = weight > 0
-            part = variance[at] / variance[at].sum(axis=1, keepdims=True)
-            share.append(weight[at] @ part / weight[at].sum())
+        system, share, without = self.case.system, [], []
         count = len(system.sources)
+        alone = [self._process([k]).covariance for k in range(count)]
+        for which in range(len(self.probabilities)):
+            moved = self.movement(which)
+            part = np.array([moved.change(np.zeros_like(moved.mean), covariance) for covariance in alone])
+            share.append(part / part.sum())
         for number in range(count):
             process = self._process([k for k in range(count) if k != number])
             varies = float(process.std.max()) > 0
@@ -208,7 +248,7 @@ class FlightLoad:
         dims, unit = ("probability", "source"), self.unit
         return xr.Dataset(
             {
-                "share": (dims, np.array(share), {"units": "1", "long_name": "share of the variance where passed"}),
+                "share": (dims, np.array(share), {"units": "1", "long_name": "share of the deviation where the level is reached"}),
                 "level_without": (dims, np.array(without).T, {"units": unit, "long_name": "level without the source"}),
             },
             {"probability": np.array(self.probabilities), "source": list(system.sources)},

@@ -99,9 +99,14 @@ class Halving:
     weight: NDArray[np.float64]
     spread: NDArray[np.float64]
 
-    def add_expected(self, old: NDArray[np.float64], middle: NDArray[np.float64]) -> None:
-        """Add what deviations at old points (count, k + 1) let expect to those of the new ones (count, k)."""
+    def applied(self, old: NDArray[np.float64], deviates: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return deviations on the finer grid (count, 2 k + 1) from those at old points (count, k + 1).
+
+        ``deviates`` (count, k), standard, are spent.
+        """
         k, count = self.neighbours.shape
+        middle = deviates
+        middle *= self.spread
         moved = np.flatnonzero(self.neighbours[:, 0] == np.arange(k) + 1 - count // 2)  # not at either end
         begin, end = (int(moved[0]), int(moved[-1]) + 1) if moved.size else (0, 0)
         for j in range(count if moved.size else 0):
@@ -109,6 +114,9 @@ class Halving:
             middle[:, begin:end] += old[:, first : first + end - begin] * self.weight[begin:end, j]
         for i in (*range(begin), *range(end, k)):
             middle[:, i] += old[:, self.neighbours[i]] @ self.weight[i]
+        finer = np.empty((len(old), old.shape[1] + k))
+        finer[:, ::2], finer[:, 1::2] = old, middle
+        return finer
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,6 +148,14 @@ class OneOutput:
         return 2 ** len(self.halvings)
 
     @cached_property
+    def expected(self) -> NDArray[np.float64]:
+        """What deviations at the points drawn let expect at those seen, (m seen, m)."""
+        found = np.eye(self.drawn.times.size)
+        for halving in self.halvings:
+            found = halving.applied(found, np.zeros((len(found), halving.spread.size)))
+        return found.T
+
+    @cached_property
     def _factor(self) -> NDArray[np.float64]:
         """The lower factor L of R = L L', zero where nothing varies."""
         varies = np.flatnonzero(self.std[:, 0] > 0)
@@ -166,12 +182,7 @@ class OneOutput:
     def refined(self, deviations: NDArray[np.float64], random: np.random.Generator) -> NDArray[np.float64]:
         found = deviations[:, :, 0]
         for halving in self.halvings:
-            middle = random.standard_normal((len(found), halving.spread.size))
-            middle *= halving.spread
-            halving.add_expected(found, middle)
-            finer = np.empty((len(found), found.shape[1] + middle.shape[1]))
-            finer[:, ::2], finer[:, 1::2] = found, middle
-            found = finer
+            found = halving.applied(found, random.standard_normal((len(found), halving.spread.size)))
         return found[:, :, None]
 
 

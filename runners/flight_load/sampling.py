@@ -34,12 +34,15 @@ class Draws:
         S over the number of places beyond the drawn-in boundary.
     near, coarser : Sightings
         On the grid seen, and on every second point of it.
+    deviations : (count, m, r) array or None
+        Of the paths from the mean on the grid drawn, where they are kept.
     """
 
     process: Process
     weight: NDArray[np.float64]
     near: Sightings
     coarser: Sightings
+    deviations: NDArray[np.float64] | None = None
 
     def contributions(self, boundary: Boundary) -> NDArray[np.float64]:
         """Return what each draw adds to the probability of passing a boundary, whose mean is the estimate, (count,).
@@ -75,7 +78,9 @@ def instant_probabilities(process: Process, boundary: Boundary) -> NDArray[np.fl
     return np.where(std > 0, log_ndtr(np.where(std > 0, deviate, 0.0)), np.where(beyond > 0, 0.0, -np.inf))
 
 
-def draw_beyond(process: Process, boundary: Boundary, random: np.random.Generator, count: int) -> Draws:
+def draw_beyond(
+    process: Process, boundary: Boundary, random: np.random.Generator, count: int, keep: bool = False
+) -> Draws:
     """Draw paths beyond a boundary, in parts that fit into memory.
 
     Parameters
@@ -85,29 +90,34 @@ def draw_beyond(process: Process, boundary: Boundary, random: np.random.Generato
         On the grid seen.
     random : Generator
     count : int
+    keep : bool
+        Whether the deviations are kept, for few outputs.
     """
     m, r = process.seen.mean.shape
     largest = max(16, int(MEMORY / (m * r)))
-    weights, near, coarser = [], [], []
+    weights, near, coarser, kept = [], [], [], []
     while count > 0:
-        paths, weight = _paths_beyond(process, boundary, random, min(count, largest))
+        deviations, paths, weight = _paths_beyond(process, boundary, random, min(count, largest))
         weights.append(weight)
         near.append(sightings(paths, boundary, process.seen))
         coarser.append(sightings(paths, boundary, process.seen, every=2))
+        if keep:
+            kept.append(deviations)
         count -= len(weight)
-    return Draws(process, np.concatenate(weights), Sightings.joined(near), Sightings.joined(coarser))
+    sighted = Sightings.joined(near), Sightings.joined(coarser)
+    return Draws(process, np.concatenate(weights), *sighted, np.concatenate(kept) if keep else None)
 
 
 def _paths_beyond(
     process: Process, boundary: Boundary, random: np.random.Generator, count: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return paths (count, m, r) on the grid seen and their weights."""
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return deviations on the grid drawn, paths on the grid seen, both (count, m, r), and weights."""
     inner = boundary.at(slice(None, None, process.stride)).drawn_in(process.between)
     log_p = instant_probabilities(process, inner)
     log_sum = float(logsumexp(log_p))
     deviations = process.deviations(random, count)
     if not np.isfinite(log_sum):  # nothing ever comes near
-        return process.seen.mean + process.refined(deviations, random), np.zeros(count)
+        return deviations, process.seen.mean + process.refined(deviations, random), np.zeros(count)
     cumulative = np.cumsum(np.exp(log_p - log_sum).ravel())
     spread = (np.arange(count) + random.random(count)) / count * cumulative[-1]
     chosen = np.minimum(np.searchsorted(cumulative, spread, side="right"), cumulative.size - 1)
@@ -122,4 +132,4 @@ def _paths_beyond(
     drawn = process.drawn.mean + deviations
     number = (drawn > inner.upper).sum(axis=(1, 2)) + (drawn < inner.lower).sum(axis=(1, 2))
     weight = np.exp(log_sum - np.log(np.maximum(number, 1)))
-    return process.seen.mean + process.refined(deviations, random), weight
+    return deviations, process.seen.mean + process.refined(deviations, random), weight

@@ -41,20 +41,24 @@ def checked_window(case: Case, window: tuple[float, float] | None) -> tuple[floa
     return begin, end
 
 
-def window_chain(case: Case, window: tuple[float, float], steps: int) -> MarkovChain:
+def window_chain(
+    case: Case, window: tuple[float, float], steps: int, relative_tolerance: float = TOLERANCE
+) -> MarkovChain:
     """Return the states of a case as a chain over a window cut into equal steps; kept with the case.
 
     Raises
     ------
     IntegrationError, DataError
     """
-    return case.kept(("chain", window, steps), lambda: _chain(case, np.linspace(*window, steps + 1)))
+    times = np.linspace(*window, steps + 1)
+    question = ("chain", window, steps, relative_tolerance)
+    return case.kept(question, lambda: _chain(case, times, relative_tolerance))
 
 
-def _chain(case: Case, times: NDArray[np.float64]) -> MarkovChain:
+def _chain(case: Case, times: NDArray[np.float64], relative_tolerance: float) -> MarkovChain:
     executable = case.with_means
     nodes = np.unique(time_nodes(executable, times))
     engine = available_sweep(case.executable)
     if engine is None:
         return chain_by_exact_steps(executable, nodes, SUBSTEP)
-    return chain_by_sweep(engine, executable, nodes, TOLERANCE)
+    return chain_by_sweep(engine, executable, nodes, relative_tolerance)
