@@ -15,6 +15,8 @@ __getattr__, __dir__, __all__ = _lazy.attach(
         "model.vehicle.reader": ["load_vehicle"],
         "runners.construct.build_vehicle": ["build_vehicle"],
         "runners.design.design": ["design"],
+        "runners.flight_load.limit_table": ["Limits"],
+        "runners.flight_load.load": ["FlightLoad"],
         "runners.parameter_study.run": ["run_parameter_study"],
         "runners.statistics.covariance": ["CovarianceEquation"],
         "runners.statistics.cvodes": ["Cvodes"],

@@ -4,6 +4,8 @@ from .model.system.linear_system import LinearSystem as LinearSystem
 from .model.vehicle.reader import load_vehicle as load_vehicle
 from .runners.construct.build_vehicle import build_vehicle as build_vehicle
 from .runners.design.design import design as design
+from .runners.flight_load.limit_table import Limits as Limits
+from .runners.flight_load.load import FlightLoad as FlightLoad
 from .runners.parameter_study.run import run_parameter_study as run_parameter_study
 from .runners.statistics.covariance import CovarianceEquation as CovarianceEquation
 from .runners.statistics.cvodes import Cvodes as Cvodes

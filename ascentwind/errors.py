@@ -40,6 +40,8 @@ __getattr__, __dir__, __all__ = _lazy.attach(
         "model.wind.correlation_matrix": ["NotPositiveSemidefiniteError", "RepairWarning"],
         "runners.design.design": ["InfeasibleDesignError"],
         "runners.design.problem": ["DesignProblemError"],
+        "runners.flight_load.limit_table": ["LimitError"],
+        "runners.flight_load.request": ["CertainPassageWarning", "NoVarianceError", "SpacingWarning"],
         "runners.parameter_study.cluster": ["SchedulerError"],
         "runners.parameter_study.sampling": ["UnbalancedSampleWarning"],
         "runners.parameter_study.store": ["ResumeError"],

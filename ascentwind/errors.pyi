@@ -34,6 +34,10 @@ from .model.wind.correlation_matrix import NotPositiveSemidefiniteError as NotPo
 from .model.wind.correlation_matrix import RepairWarning as RepairWarning
 from .runners.design.design import InfeasibleDesignError as InfeasibleDesignError
 from .runners.design.problem import DesignProblemError as DesignProblemError
+from .runners.flight_load.limit_table import LimitError as LimitError
+from .runners.flight_load.request import CertainPassageWarning as CertainPassageWarning
+from .runners.flight_load.request import NoVarianceError as NoVarianceError
+from .runners.flight_load.request import SpacingWarning as SpacingWarning
 from .runners.parameter_study.cluster import SchedulerError as SchedulerError
 from .runners.parameter_study.sampling import UnbalancedSampleWarning as UnbalancedSampleWarning
 from .runners.parameter_study.store import ResumeError as ResumeError

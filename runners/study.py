@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal
 
 import xarray as xr
@@ -13,6 +14,7 @@ from ..model.errors import IntegrationError, ParameterValueError
 from ..model.system.names import COMBINED
 from .case.case import Case
 from .case.times import end_times
+from .flight_load.limit_table import Limits
 from .flight_load.load import DESIGN, DRAWS, FlightLoad, flight_load
 from .flight_load.request import Sides
 from .sensitivity.check import check_sensitivity
@@ -277,6 +279,7 @@ class Study(Case):
         window: tuple[float, float] | None = None,
         probabilities: float | Iterable[float] = (DESIGN,),
         *,
+        limit: str | Path | Limits | float | None = None,
         sides: Sides = "both",
         draws: int = DRAWS,
         seed: int = 0,
@@ -291,6 +294,9 @@ class Study(Case):
         probabilities : float or iterable of float
             For each the level that the flight's maximum passes with it. 0.00135 is the chance with which a single
             instant passes mean + 3 sigma.
+        limit : path, Limits or float, optional
+            What the size of the response may not pass, over time; ``passage`` of the result says with what chance a
+            flight does, and what margin is left.
         sides : {'both', 'upper', 'lower'}
             Of the response's size, both sides together; of the response; or of its negative.
         draws : int
@@ -305,7 +311,7 @@ class Study(Case):
 
         Raises
         ------
-        UnknownNameError, TimeRangeError, ParameterValueError, DirectNoiseError, NoVarianceError, IntegrationError
+        UnknownNameError, TimeRangeError, ParameterValueError, DirectNoiseError, NoVarianceError, LimitError
 
         Warns
         -----
@@ -318,7 +324,7 @@ class Study(Case):
         Rare passages are drawn by a mixture over times (Adler, Blanchet and Liu 2012), between points of the grid as
         Brownian bridges where white noise reaches the response's rate.
         """
-        return flight_load(self, response, window, probabilities, sides, draws, seed)
+        return flight_load(self, response, window, probabilities, sides, draws, seed, limit)
 
     def sensitivity(
         self,

@@ -2284,12 +2284,13 @@ static int asked_too_much(int code, const Counters *done) {
  * mean           (count, RESPONSES)
  * estimate       (count, SOURCES, RESPONSES) relative error of the standard deviation
  * transition     (count, STATES, STATES) or null
+ * added          (count, SOURCES, STATES, STATES) covariance that each segment adds, or null
  * counters       steps, rejected steps, evaluations of A
  * failure        time, entry
  * stop           looked at in every step; not zero ends the call */
 EXPORT int sweep(int count, double start, const double *end, const double *low, const double *high, const double *p,
                  const double *tables, double tolerance, const double *size, double *P, double *m, double *covariance,
-                 double *mean, double *estimate, double *transition, double *counters, double *failure,
+                 double *mean, double *estimate, double *transition, double *added, double *counters, double *failure,
                  const volatile int *stop) {
   double C[C_SIZE], direct[RESPONSES], next[STATES], P_next[SOURCES_1 * STATES * STATES];
   double inherited[SOURCES_1 * RESPONSES], largest[SOURCES_1], made = 0.0;
@@ -2363,6 +2364,9 @@ EXPORT int sweep(int count, double start, const double *end, const double *low, 
     if (transition)
       for (i = 0; i < STATES; ++i)
         for (j = 0; j < STATES; ++j) transition[(k * STATES + i) * STATES + j] = g.transposed[j][i];
+    if (added)
+      for (s = 0; s < SOURCES; ++s)
+        for (i = 0; i < STATES; ++i) memcpy(added + ((k * SOURCES + s) * STATES + i) * STATES, g.W[s][i], STATES * sizeof(double));
     if (length > 0.1 * longest) weigh(C, &g, P, result, m, mean + k * RESPONSES, size, &weights);
     longest = larger(longest, length);
   }

@@ -300,6 +300,11 @@ class Case:
         -------
         object
             Not to be changed.
+
+        Raises
+        ------
+        AscentwindError
+            What computing it raises.
         """
         if question not in self._kept:
             self._kept[question] = answer()

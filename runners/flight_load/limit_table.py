@@ -57,7 +57,9 @@ class Limits:
                 raise LimitError(f"has shape {values.shape}, expected {shape}", file=self.file, column=name)
             if not (values > 0).all():  # NaN too
                 raise LimitError(
-                    f"{values[~(values > 0)][0]:g} is no limit of a size; give positive values", file=self.file, column=name
+                    f"{values[~(values > 0)][0]:g} is no limit of a size; give positive values",
+                    file=self.file,
+                    column=name,
                 )
 
     @staticmethod
@@ -90,7 +92,9 @@ class Limits:
                 f"has neither a column 'time [s]' nor 'station [m]'{suggestion(header[0], ARGUMENTS)}", file=file
             )
         first = axes[0]
-        table = read_csv_table(file, first, ARGUMENTS[first], order="increasing" if len(axes) == 1 else "not decreasing")
+        table = read_csv_table(
+            file, first, ARGUMENTS[first], order="increasing" if len(axes) == 1 else "not decreasing"
+        )
         points: dict[str, NDArray[np.float64]] = {a: np.unique(table.column(a, ARGUMENTS[a])) for a in axes}
         names = [name for name in table.columns if name not in ARGUMENTS]
         shape = tuple(points[axis].size if axis in points else 1 for axis in ARGUMENTS)
@@ -106,27 +110,71 @@ class Limits:
 
     @staticmethod
     def constant(value: float, response: str, unit: str) -> Limits:
-        """Return one limit of one response that holds at all times, in its SI unit."""
+        """Return one limit of one response that holds at all times.
+
+        Parameters
+        ----------
+        value : float
+            In the unit given.
+        response, unit : str
+
+        Returns
+        -------
+        Limits
+
+        Raises
+        ------
+        LimitError
+        """
         return Limits(None, None, {response: np.array([[float(value)]])}, {response: unit})
 
     @staticmethod
     def over_time(time: ArrayLike, values: Mapping[str, ArrayLike], units: Mapping[str, str]) -> Limits:
-        """Return limits over time (s), by response, in their SI units."""
+        """Return limits over time.
+
+        Parameters
+        ----------
+        time : (k,) array_like
+            s, increasing.
+        values : mapping of str to (k,) array_like
+            By response, in the units given.
+        units : mapping of str to str
+            SI unit by response.
+
+        Returns
+        -------
+        Limits
+
+        Raises
+        ------
+        LimitError
+        """
         columns = {name: np.asarray(column, float).reshape(-1, 1) for name, column in values.items()}
         return Limits(np.asarray(time, float), None, columns, dict(units))
 
     def of(self, response: str, unit: str, times: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the limit of a response at times (s) and, where they are over stations, at their stations.
+        """Return the limit of a response at times and, where they are over stations, at their stations.
+
+        Parameters
+        ----------
+        response, unit : str
+            The response and the SI unit it has.
+        times : (m,) array
+            s, increasing.
 
         Returns
         -------
         (m, n) array
-            n is one without stations.
+            In that unit; n is one without stations.
 
         Raises
         ------
-        UnknownNameError, LimitError, TimeRangeError
-            There is no limit of the response, it is in another unit, or it ends before the times do.
+        UnknownNameError
+            There is no limit of the response.
+        LimitError
+            It is in another unit.
+        TimeRangeError
+            It ends before the times do.
         """
         if response not in self.values:
             raise UnknownNameError("limit of response", response, self.values)
@@ -146,6 +194,30 @@ class Limits:
                 f"from {times[0]:g} to {times[-1]:g} s; add rows or ask for a shorter window"
             )
         return np.stack([np.interp(times, self.time, column) for column in values.T], axis=1)
+
+
+def limits_over_time(
+    limit: str | Path | Limits | float, response: str, unit: str, window: tuple[float, float]
+) -> Limits:
+    """Return the limits of one response from what a person gives: a file, a table, or one number in its SI unit.
+
+    Raises
+    ------
+    DataError, UnknownNameError, LimitError, TimeRangeError
+        They are over stations, or do not hold over the window.
+    """
+    if isinstance(limit, bool) or not isinstance(limit, str | Path | Limits | float | int):
+        raise LimitError(f"{limit!r:.60} is no limit; give a file, a table of limits or a number in [{unit}]")
+    if isinstance(limit, str | Path):
+        limit = Limits.read(limit)
+    elif not isinstance(limit, Limits):
+        limit = Limits.constant(float(limit), response, unit)
+    if limit.station is not None:
+        raise LimitError(
+            "is over stations of the structure; ask with limit_passage, which takes them jointly", file=limit.file
+        )
+    limit.of(response, unit, np.array(window))
+    return limit
 
 
 def _refuse_gaps(table: CsvTable, points: dict[str, NDArray[np.float64]]) -> None:

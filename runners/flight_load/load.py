@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 import xarray as xr
@@ -15,9 +16,11 @@ from ...model.errors import ParameterValueError
 from ..case.case import Case
 from ..case.provenance import provenance
 from .crossings import Boundary
+from .limit_table import LimitError, Limits, limits_over_time
+from .passage import Passage
 from .pathwise import Movement, movement
 from .probability import Estimate, Level, estimate, find_level
-from .process import OneOutput, one_output
+from .process import OneOutput
 from .request import (
     Sides,
     SpacingWarning,
@@ -26,13 +29,14 @@ from .request import (
     checked_sides,
     refuse_without_variance,
 )
+from .response import ResponseInWindow
 from .sampling import draw_beyond
-from .window import checked_window, window_chain
+from .sensitivity import level_sensitivity
+from .window import checked_window
 
 DESIGN = 0.00135  # 1 - Phi(3): with this chance an instant passes mean + 3 sigma
 STEPS = 2400  # of the window at first; AS-504 in 60 s: 0.025 s
 MOST_STEPS = 9600
-HALVINGS = 2  # from the grid of which paths are drawn to the one on which they are seen
 SPACING_ERROR = 0.02  # relative, of a probability; finer where it is larger
 DRAWS = 2000
 MOVED = 8000  # draws of paths that just reach a level, of which derivatives are made
@@ -45,41 +49,44 @@ class FlightLoad:
 
     Attributes
     ----------
-    case : Case
-    response : str
-    window : (float, float)
-        s.
+    of : ResponseInWindow
+        The case, the response and the window.
     probabilities : tuple of float
         For which levels were asked.
     sides : {'both', 'upper', 'lower'}
         Whether the maximum is of the size of the response, of the response, or of its negative.
-    draws, seed, steps : int
-        Paths drawn, the seed of the draws, and steps of the window.
+    draws, seed : int
+        Paths drawn, and the seed of the draws.
+    limits : Limits or None
+        What the response may not pass over time.
     """
 
-    case: Case
-    response: str
-    window: tuple[float, float]
+    of: ResponseInWindow
     probabilities: tuple[float, ...]
     sides: Sides
     draws: int
     seed: int
-    steps: int
+    limits: Limits | None = None
+
+    @property
+    def response(self) -> str:
+        """Its name."""
+        return self.of.response
 
     @property
     def unit(self) -> str:
         """Unit of the response."""
-        return self.case.system.outputs[self.case.system.output_index(self.response)].unit
+        return self.of.unit
+
+    @property
+    def window(self) -> tuple[float, float]:
+        """Begin and end, s."""
+        return self.of.window
 
     @cached_property
     def process(self) -> OneOutput:
         """The response as a Gaussian process over the window."""
-        return self._process(None)
-
-    def _process(self, sources: Sequence[int] | None) -> OneOutput:
-        chain = window_chain(self.case, self.window, self.steps)
-        row = self.case.system.output_index(self.response)
-        return one_output(chain, chain.output[:, row], chain.mean[:, row], HALVINGS, sources)
+        return self.of.process()
 
     def _boundary(self, value: float) -> Boundary:
         return Boundary.around(np.full(self.process.seen.mean.shape, value), self.sides)
@@ -136,7 +143,16 @@ class FlightLoad:
         return estimate(draw_beyond(self.process, boundary, self._random(1), self.draws), boundary)
 
     def number_of(self, probability: float | None) -> int:
-        """Return the number of a probability among those asked for; of the first for None.
+        """Return the number of a probability among those asked for.
+
+        Parameters
+        ----------
+        probability : float or None
+            Dimensionless; the first for None.
+
+        Returns
+        -------
+        int
 
         Raises
         ------
@@ -148,6 +164,17 @@ class FlightLoad:
             known = ", ".join(f"{p:g}" for p in self.probabilities)
             raise ParameterValueError(f"no level was asked for with probability {probability:g}; known: {known}")
         return self.probabilities.index(probability)
+
+    @cached_property
+    def passage(self) -> Passage:
+        """Whether a flight keeps the limit of the response, at the first of the probabilities.
+
+        Raises a LimitError where no limit was given.
+        """
+        if self.limits is None:
+            raise LimitError(f"no limit of '{self.response}' was given; ask with limit=...")
+        limit = self.limits.of(self.response, self.unit, self.process.seen.times)
+        return Passage(self.process, limit, self.unit, None, self.sides, self.probabilities[0], self.draws, self.seed)
 
     @cached_property
     def exceedance(self) -> xr.DataArray:
@@ -199,7 +226,17 @@ class FlightLoad:
         )
 
     def movement(self, which: int) -> Movement:
-        """Return how the level of a probability, by its number, moves with mean and covariance of the response."""
+        """Return how a level moves with mean and covariance of the response.
+
+        Parameters
+        ----------
+        which : int
+            Number of its probability.
+
+        Returns
+        -------
+        Movement
+        """
         return movement(self.process, self.levels[which], self._random(4, which), MOVED)
 
     def sensitivity(self, probability: float | None = None, parameters: Iterable[str] | None = None) -> xr.Dataset:
@@ -208,7 +245,7 @@ class FlightLoad:
         Parameters
         ----------
         probability : float, optional
-            One of those asked for; the first without it.
+            One of those asked for, dimensionless; the first without it.
         parameters : iterable of str, optional
             The dozen that lead without it.
 
@@ -222,9 +259,9 @@ class FlightLoad:
         ------
         ParameterValueError, UnknownNameError, StructuralParameterError
         """
-        from .sensitivity import level_sensitivity
-
-        return level_sensitivity(self, probability, parameters)
+        which = self.number_of(probability)
+        found = level_sensitivity(self.of, self.levels[which], self.movement(which), parameters)
+        return found.assign_attrs(probability=self.probabilities[which], sides=self.sides)
 
     @cached_property
     def shares(self) -> xr.Dataset:
@@ -233,22 +270,26 @@ class FlightLoad:
         ``share`` of what paths that just reach the level are away from the mean there, adding up to one; fast sources
         have more of it than of the variance. ``level_without`` the level of a flight in which the source is silent.
         """
-        system, share, without = self.case.system, [], []
+        system, share, without = self.of.case.system, [], []
         count = len(system.sources)
-        alone = [self._process([k]).covariance for k in range(count)]
+        alone = [self.of.process([k]).covariance for k in range(count)]
         for which in range(len(self.probabilities)):
             moved = self.movement(which)
             part = np.array([moved.change(np.zeros_like(moved.mean), covariance) for covariance in alone])
             share.append(part / part.sum())
         for number in range(count):
-            process = self._process([k for k in range(count) if k != number])
+            process = self.of.process([k for k in range(count) if k != number])
             varies = float(process.std.max()) > 0
             constant = {"both": np.abs, "upper": np.asarray, "lower": np.negative}[self.sides](process.seen.mean).max()
             without.append([self._level(process, p).value if varies else float(constant) for p in self.probabilities])
         dims, unit = ("probability", "source"), self.unit
         return xr.Dataset(
             {
-                "share": (dims, np.array(share), {"units": "1", "long_name": "share of the deviation where the level is reached"}),
+                "share": (
+                    dims,
+                    np.array(share),
+                    {"units": "1", "long_name": "share of the deviation where the level is reached"},
+                ),
                 "level_without": (dims, np.array(without).T, {"units": unit, "long_name": "level without the source"}),
             },
             {"probability": np.array(self.probabilities), "source": list(system.sources)},
@@ -257,16 +298,19 @@ class FlightLoad:
     def to_dataset(self) -> xr.Dataset:
         """Return everything in one dataset, levels as ``level_of`` (probability,)."""
         level, interval = self.level.rename("level_of"), self.interval.rename("interval_of")
-        found = xr.merge([level, interval, self.spacing_error.rename("spacing_error"), self.exceedance, self.shares])
+        parts = [level, interval, self.spacing_error.rename("spacing_error"), self.exceedance, self.shares]
+        found = xr.merge(parts, combine_attrs="drop")
         found = found.merge(self.time_of_maximum.to_dataset())
         return found.assign_attrs(
-            provenance(self.case)
+            provenance(self.of.case)
             | {"response": self.response, "unit": self.unit, "sides": self.sides, "window_s": list(self.window)}
-            | {"draws": self.draws, "seed": self.seed, "steps": self.steps}
+            | {"draws": self.draws, "seed": self.seed, "steps": self.of.steps}
         )
 
     def __repr__(self) -> str:
-        lines = [f"FlightLoad of {self.response} [{self.unit}], {self.window[0]:g} to {self.window[1]:g} s, {self.sides}"]
+        lines = [
+            f"FlightLoad of {self.response} [{self.unit}], {self.window[0]:g} to {self.window[1]:g} s, {self.sides}"
+        ]
         for p, found in zip(self.probabilities, self.levels, strict=True):
             low, high = found.interval
             lines.append(f"passed with {p:g}: {found.value:.5g} ({low:.5g} to {high:.5g})")
@@ -290,20 +334,24 @@ def flight_load(
     sides: Sides,
     draws: int,
     seed: int,
+    limit: str | Path | Limits | float | None = None,
 ) -> FlightLoad:
     """See :meth:`Study.flight_load`."""
     (name,) = case.checked_responses([response])
     checked_draws(draws, seed)
     asked = checked_probabilities(probabilities)
-    load = FlightLoad(case, name, checked_window(case, window), asked, checked_sides(sides), draws, seed, STEPS)
+    flown = checked_window(case, window)
+    asked_of = ResponseInWindow(case, name, flown, STEPS)
+    limits = None if limit is None else limits_over_time(limit, name, asked_of.unit, flown)
+    load = FlightLoad(asked_of, asked, checked_sides(sides), draws, seed, limits)
     refuse_without_variance(name, load.process)
-    while float(load.spacing_error.max()) > SPACING_ERROR and load.steps < MOST_STEPS:
-        load = replace(load, steps=2 * load.steps)
+    while float(load.spacing_error.max()) > SPACING_ERROR and load.of.steps < MOST_STEPS:
+        load = replace(load, of=replace(load.of, steps=2 * load.of.steps))
     missed = float(load.spacing_error.max())
     if missed > SPACING_ERROR:
         text = (
-            f"the grid of {load.steps} steps still misses about {100 * missed:.2g} % of the probability that '{name}' "
-            "passes its level; ask for a shorter window"
+            f"the grid of {load.of.steps} steps still misses about {100 * missed:.2g} % of the probability that "
+            f"'{name}' passes its level; ask for a shorter window"
         )
         warnings.warn(SpacingWarning(text), stacklevel=3)
     return load

@@ -240,9 +240,7 @@ def one_output(
     return OneOutput(drawn, seen, R, tuple(found), between[:, None])
 
 
-def _band(
-    chain: MarkovChain, row: NDArray[np.float64], P: NDArray[np.float64], width: int
-) -> NDArray[np.float64]:
+def _band(chain: MarkovChain, row: NDArray[np.float64], P: NDArray[np.float64], width: int) -> NDArray[np.float64]:
     """Return R(t_i, t_{i - l}) for l = 0 ... width - 1, (m, width); zero before the first time."""
     m, n = row.shape
     band = np.zeros((m, width))

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,7 +83,9 @@ def chain_by_sweep(
     ------
     IntegrationError, DataError
     """
-    segments = flight_segments(executable, tuple(times.tolist()), longest_segment(float(times[-1] - executable.system.start)))
+    segments = flight_segments(
+        executable, tuple(times.tolist()), longest_segment(float(times[-1] - executable.system.start))
+    )
     found = swept(engine, executable, segments, relative_tolerance, steps=True)
     assert found.transition is not None and found.added is not None
     system = executable.system
@@ -92,7 +95,7 @@ def chain_by_sweep(
     for k in range(at[0] + 1):
         P = found.transition[k] @ P @ found.transition[k].T + found.added[k]
     transition, added = found.transition[at[1:]].copy(), found.added[at[1:]].copy()
-    for step, (before, last) in enumerate(zip(at[:-1], at[1:], strict=True)):
+    for step, (before, last) in enumerate(pairwise(at.tolist())):
         for k in range(last - 1, before, -1):  # a step in which flight is cut again, from its end to its begin
             added[step] += transition[step] @ found.added[k] @ transition[step].T
             transition[step] = transition[step] @ found.transition[k]
