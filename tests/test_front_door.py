@@ -39,7 +39,6 @@ EXAMPLES = {
     "SeveralDataErrors": lambda: errors.SeveralDataErrors([errors.DataError("is odd", row=3), errors.DataError("too")]),
     "StepBudgetError": lambda: errors.StepBudgetError(10, "t = 12 s", time=12.0, fastest="-900, slosh 1"),
     "StructuralParameterError": lambda: errors.StructuralParameterError("modes"),
-    "GroupedFactorError": lambda: errors.GroupedFactorError("aerodynamics"),
     "TableParameterError": lambda: errors.TableParameterError("thrust"),
     "UnknownNameError": lambda: errors.UnknownNameError("response", "momnt", ["moment"]),
 }

@@ -148,7 +148,7 @@ class FlightLoad:
         Parameters
         ----------
         probability : float or None
-            Dimensionless; the first for None.
+            A probability; the first for None.
 
         Returns
         -------
@@ -245,7 +245,7 @@ class FlightLoad:
         Parameters
         ----------
         probability : float, optional
-            One of those asked for, dimensionless; the first without it.
+            A probability asked for; the first without it.
         parameters : iterable of str, optional
             The dozen that lead without it.
 
