@@ -13,9 +13,9 @@ from .model.errors import DirectNoiseError as DirectNoiseError
 from .model.errors import ExtrapolationWarning as ExtrapolationWarning
 from .model.errors import IntegrationError as IntegrationError
 from .model.errors import ModeError as ModeError
-from .model.errors import NoVehicleError as NoVehicleError
 from .model.errors import NonlinearSystemError as NonlinearSystemError
 from .model.errors import NotPicklableError as NotPicklableError
+from .model.errors import NoVehicleError as NoVehicleError
 from .model.errors import OutputFolderError as OutputFolderError
 from .model.errors import ParameterValueError as ParameterValueError
 from .model.errors import PlausibilityWarning as PlausibilityWarning
