@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .process import Grid
+from .process import Grid, Steps
 
 NEVER = -50.0  # exponent of a bridge that does not count
 
@@ -130,31 +130,31 @@ class Sightings:
         return bounds[self.step] - self.begin, bounds[self.step + 1] - self.end
 
 
-def sightings(paths: NDArray[np.float64], boundary: Boundary, grid: Grid, every: int = 1) -> Sightings:
-    """Look for the steps in which paths come near a boundary.
+def sightings(count: int, steps: Steps, boundary: Boundary, grid: Grid, every: int = 1) -> Sightings:
+    """Return those of some steps of paths that come near a boundary.
 
     Parameters
     ----------
-    paths : (count, m, r) array
+    count : int
+        Paths.
+    steps : Steps
     boundary : Boundary
     grid : Grid
-        Where the paths are known.
     every : int
-        Looks at every second, third, ... point only.
+        The steps are those of every second, third, ... point of the grid; so is the boundary looked at.
     """
     at = slice(None, None, every)
-    seen, times, diffusion = boundary.at(at), grid.times[at], grid.diffusion[at]
+    seen, times, mean, diffusion = boundary.at(at), grid.times[at], grid.mean[at], grid.diffusion[at]
     variance = 0.5 * (diffusion[1:] ** 2 + diffusion[:-1] ** 2) * np.diff(times)[:, None]
-    reach = np.zeros_like(diffusion)  # how near a point lies at least to where a bridge that counts begins or ends
-    reach[1:] = np.sqrt(-0.5 * NEVER * variance)
-    reach[:-1] = np.maximum(reach[:-1], reach[1:])
-    values = paths[:, at]
-    close = ((values > seen.upper - reach) | (values < seen.lower + reach)).any(axis=2)
-    path, step = np.nonzero(close[:, :-1] | close[:, 1:])
-    begin, end = values[path, step], values[path, step + 1]
+    reach = np.sqrt(-0.5 * NEVER * variance)[steps.step]  # how near an end lies at least to where a bridge counts
+    begin, end = mean[steps.step] + steps.begin, mean[steps.step + 1] + steps.end
+    close = (begin > seen.upper[steps.step] - reach) | (begin < seen.lower[steps.step] + reach)
+    close |= (end > seen.upper[steps.step + 1] - reach) | (end < seen.lower[steps.step + 1] + reach)
+    kept = np.flatnonzero(close.any(axis=1))
+    begin, end, step = begin[kept], end[kept], steps.step[kept]
     return Sightings(
-        len(paths),
-        path,
+        count,
+        steps.path[kept],
         step,
         np.stack([begin, -begin], axis=2),
         np.stack([end, -end], axis=2),

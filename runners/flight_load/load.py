@@ -15,7 +15,8 @@ from scipy.special import ndtri_exp
 from ...model.errors import ParameterValueError
 from ..case.case import Case
 from ..case.provenance import provenance
-from .crossings import Boundary
+from ..statistics.percentiles import instant_level
+from .crossings import Boundary, sightings
 from .limit_table import LimitError, Limits, limits_over_time
 from .passage import Passage
 from .pathwise import Movement, movement
@@ -97,16 +98,23 @@ class FlightLoad:
     @cached_property
     def levels(self) -> tuple[Level, ...]:
         """What is found for every probability: level, interval, estimate, paths."""
-        return tuple(self._level(self.process, p) for p in self.probabilities)
+        return tuple(self._level(self.process, p, self.draws) for p in self.probabilities)
 
-    def _level(self, process: OneOutput, probability: float) -> Level:
+    def _level(self, process: OneOutput, probability: float, draws: int) -> Level:
         size = float((np.abs(process.drawn.mean) + process.std).max())
-        return find_level(process, probability, self._boundary, size, self._random(0), self.draws)
+        return find_level(process, probability, self._boundary, size, self._random(0), draws)
 
     @cached_property
     def level(self) -> xr.DataArray:
         """The level that the flight's maximum passes with each probability, (probability,)."""
         return self._array([found.value for found in self.levels], "level that the flight's maximum passes")
+
+    @cached_property
+    def instant_level(self) -> xr.DataArray:
+        """The level that the worst single instant passes with each probability, (probability,); the lower one."""
+        moments = self.process.drawn.mean, self.process.std
+        values = [float(instant_level(*moments, p, self.sides).max()) for p in self.probabilities]
+        return self._array(values, "level that the worst instant passes")
 
     @cached_property
     def interval(self) -> xr.DataArray:
@@ -208,9 +216,14 @@ class FlightLoad:
         """
         edges, times = np.linspace(*self.window, BINS + 1), self.process.seen.times
         random = self._random(3)
-        flown = self.process.refined(self.process.deviations(random, self.draws), random) + self.process.seen.mean
-        size = {"both": np.abs(flown), "upper": flown, "lower": -flown}[self.sides][:, :, 0]
-        rows = [np.histogram(times[size.argmax(axis=1)], edges, density=True)[0]]
+        drawn = self.process.deviations(random, self.draws)
+        size = {"both": np.abs, "upper": np.asarray, "lower": np.negative}[self.sides](self.process.drawn.mean + drawn)
+        near = (size > size.max(axis=1, keepdims=True) - 2 * self.process.between).any(axis=2)
+        steps, _ = self.process.steps_near(drawn, near, random)
+        _, points, *_ = sightings(self.draws, steps, self._boundary(-np.inf), self.process.seen).worst(
+            self._boundary(0.0)
+        )
+        rows = [np.histogram(times[points], edges, density=True)[0]]
         for found in self.levels:
             weight = found.draws.places(found.boundary).sum(axis=(1, 2))
             rows.append(np.histogram(times, edges, weights=weight, density=True)[0])
@@ -274,14 +287,16 @@ class FlightLoad:
         count = len(system.sources)
         alone = [self.of.process([k]).covariance for k in range(count)]
         for which in range(len(self.probabilities)):
-            moved = self.movement(which)
+            moved = movement(self.process, self.levels[which], self._random(5, which), 2 * self.draws)
             part = np.array([moved.change(np.zeros_like(moved.mean), covariance) for covariance in alone])
             share.append(part / part.sum())
+        size_of = {"both": np.abs, "upper": np.asarray, "lower": np.negative}[self.sides]
         for number in range(count):
             process = self.of.process([k for k in range(count) if k != number])
-            varies = float(process.std.max()) > 0
-            constant = {"both": np.abs, "upper": np.asarray, "lower": np.negative}[self.sides](process.seen.mean).max()
-            without.append([self._level(process, p).value if varies else float(constant) for p in self.probabilities])
+            if float(process.std.max()) > 0:
+                without.append([self._level(process, p, self.draws // 4).value for p in self.probabilities])
+            else:
+                without.append([float(size_of(process.seen.mean).max())] * len(self.probabilities))
         dims, unit = ("probability", "source"), self.unit
         return xr.Dataset(
             {
@@ -296,11 +311,25 @@ class FlightLoad:
         )
 
     def to_dataset(self) -> xr.Dataset:
-        """Return everything in one dataset, levels as ``level_of`` (probability,)."""
-        level, interval = self.level.rename("level_of"), self.interval.rename("interval_of")
-        parts = [level, interval, self.spacing_error.rename("spacing_error"), self.exceedance, self.shares]
-        found = xr.merge(parts, combine_attrs="drop")
-        found = found.merge(self.time_of_maximum.to_dataset())
+        """Return everything in one dataset: over probability, along the curve of exceedance, and over time.
+
+        Returns
+        -------
+        xarray.Dataset
+        """
+        curve = self.exceedance
+        units = {"units": self.unit}
+        parts = {
+            "flight_level": self.level,
+            "flight_level_interval": self.interval,
+            "spacing_error": self.spacing_error,
+            "instant_level": self.instant_level,
+            "exceedance_level": ("point", curve["level"].values, units | {"long_name": "level"}),
+            "exceedance": ("point", curve.values, curve.attrs),
+            "exceedance_error": ("point", curve["standard_error"].values, curve["standard_error"].attrs),
+            "time_of_maximum": self.time_of_maximum,
+        }
+        found = xr.Dataset(parts).merge(self.shares)
         return found.assign_attrs(
             provenance(self.of.case)
             | {"response": self.response, "unit": self.unit, "sides": self.sides, "window_s": list(self.window)}

@@ -42,6 +42,37 @@ class Grid:
     diffusion: NDArray[np.float64]
 
 
+@dataclass(frozen=True, eq=False)
+class Steps:
+    """Some steps of many paths.
+
+    Attributes
+    ----------
+    path, step : (k,) arrays of int
+    begin, end : (k, r) arrays
+        Deviations from the mean at their ends.
+    """
+
+    path: NDArray[np.intp]
+    step: NDArray[np.intp]
+    begin: NDArray[np.float64]
+    end: NDArray[np.float64]
+
+    @staticmethod
+    def of(paths: NDArray[np.float64], near: NDArray[np.bool_]) -> Steps:
+        """Return the steps of paths (count, m, r) beside points ``near`` (count, m)."""
+        path, step = np.nonzero(near[:, 1:] | near[:, :-1])
+        return Steps(path, step, paths[path, step], paths[path, step + 1])
+
+    @staticmethod
+    def of_every_second(paths: NDArray[np.float64], near: NDArray[np.bool_]) -> Steps:
+        """Return the same of every second point."""
+        seen = near[:, ::2].copy()
+        between = near[:, 1::2]
+        seen[:, : between.shape[1]] |= between
+        return Steps.of(paths[:, ::2], seen)
+
+
 class Process(Protocol):
     """r outputs on a grid of which paths are drawn, and on a finer one on which they are seen.
 
@@ -76,8 +107,13 @@ class Process(Protocol):
         """Return covariances of everything with chosen outputs at chosen points, (len(points), m, r)."""
         ...
 
-    def refined(self, deviations: NDArray[np.float64], random: np.random.Generator) -> NDArray[np.float64]:
-        """Return drawn deviations, conditioned or not, with what lies between their points: on the finer grid."""
+    def steps_near(
+        self, deviations: NDArray[np.float64], near: NDArray[np.bool_], random: np.random.Generator
+    ) -> tuple[Steps, Steps]:
+        """Return the steps of drawn deviations, conditioned or not, beside points ``near`` (count, m).
+
+        On the grid seen, where what lies between the points drawn is drawn as well, and on every second point of it.
+        """
         ...
 
 
@@ -99,23 +135,38 @@ class Halving:
     weight: NDArray[np.float64]
     spread: NDArray[np.float64]
 
-    def applied(self, old: NDArray[np.float64], deviates: NDArray[np.float64]) -> NDArray[np.float64]:
+    def between(
+        self,
+        old: NDArray[np.float64],
+        path: NDArray[np.intp],
+        point: NDArray[np.intp],
+        random: np.random.Generator,
+    ) -> NDArray[np.float64]:
+        """Return drawn deviations of some paths at some new points (k,), from those at old points (count, k + 1)."""
+        value = self.spread[point] * random.standard_normal(path.size)
+        for neighbour, weight in zip(self.neighbours.T, self.weight.T, strict=True):
+            value += old[path, neighbour[point]] * weight[point]
+        return value
+
+    def applied(
+        self, old: NDArray[np.float64], near: NDArray[np.bool_], random: np.random.Generator
+    ) -> NDArray[np.float64]:
         """Return deviations on the finer grid (count, 2 k + 1) from those at old points (count, k + 1).
 
-        ``deviates`` (count, k), standard, are spent.
+        New ones are drawn where ``near`` (count, k); elsewhere they lie straight between their neighbours.
         """
-        k, count = self.neighbours.shape
-        middle = deviates
-        middle *= self.spread
-        moved = np.flatnonzero(self.neighbours[:, 0] == np.arange(k) + 1 - count // 2)  # not at either end
-        begin, end = (int(moved[0]), int(moved[-1]) + 1) if moved.size else (0, 0)
-        for j in range(count if moved.size else 0):
-            first = int(self.neighbours[begin, j])
-            middle[:, begin:end] += old[:, first : first + end - begin] * self.weight[begin:end, j]
-        for i in (*range(begin), *range(end, k)):
-            middle[:, i] += old[:, self.neighbours[i]] @ self.weight[i]
-        finer = np.empty((len(old), old.shape[1] + k))
-        finer[:, ::2], finer[:, 1::2] = old, middle
+        finer = np.empty((len(old), old.shape[1] + near.shape[1]))
+        finer[:, ::2] = old
+        finer[:, 1::2] = 0.5 * (old[:, 1:] + old[:, :-1])
+        path, point = np.nonzero(near)
+        finer[path, 2 * point + 1] = self.between(old, path, point, random)
+        return finer
+
+    def expected(self, old: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return what deviations at old points (count, k + 1) let expect on the finer grid (count, 2 k + 1)."""
+        finer = np.empty((len(old), old.shape[1] + self.spread.size))
+        finer[:, ::2] = old
+        finer[:, 1::2] = np.einsum("ckj,kj->ck", old[:, self.neighbours], self.weight)
         return finer
 
 
@@ -152,7 +203,7 @@ class OneOutput:
         """What deviations at the points drawn let expect at those seen, (m seen, m)."""
         found = np.eye(self.drawn.times.size)
         for halving in self.halvings:
-            found = halving.applied(found, np.zeros((len(found), halving.spread.size)))
+            found = halving.expected(found)
         return found.T
 
     @cached_property
@@ -179,11 +230,29 @@ class OneOutput:
     def covariances(self, points: NDArray[np.intp], outputs: NDArray[np.intp]) -> NDArray[np.float64]:
         return self.covariance[points][:, :, None]
 
-    def refined(self, deviations: NDArray[np.float64], random: np.random.Generator) -> NDArray[np.float64]:
+    def steps_near(
+        self, deviations: NDArray[np.float64], near: NDArray[np.bool_], random: np.random.Generator
+    ) -> tuple[Steps, Steps]:
+        if not self.halvings:
+            return Steps.of(deviations, near), Steps.of_every_second(deviations, near)
         found = deviations[:, :, 0]
-        for halving in self.halvings:
-            found = halving.applied(found, random.standard_normal((len(found), halving.spread.size)))
-        return found[:, :, None]
+        for halving in self.halvings[:-1]:
+            steps = near[:, 1:] | near[:, :-1]
+            wider = steps.copy()
+            for _ in range(NEIGHBOURS // 2):  # what the next halving looks at
+                wider[:, 1:] |= wider[:, :-1].copy()
+                wider[:, :-1] |= wider[:, 1:].copy()
+            found = halving.applied(found, wider, random)
+            finer = np.zeros(found.shape, bool)
+            finer[:, ::2], finer[:, 1::2] = near, steps
+            near = finer
+        coarser = Steps.of(found[:, :, None], near)
+        path, step = coarser.path, coarser.step
+        middle = self.halvings[-1].between(found, path, step, random)[:, None]
+        both = np.stack([coarser.begin, middle], axis=1), np.stack([middle, coarser.end], axis=1)
+        begin, end = (part.reshape(-1, 1) for part in both)
+        halves = np.stack([2 * step, 2 * step + 1], axis=1).ravel()
+        return Steps(np.repeat(path, 2), halves, begin, end), coarser
 
 
 def one_output(
@@ -377,8 +446,10 @@ class ManyOutputs:
         found[order] = self._seen(states)
         return found
 
-    def refined(self, deviations: NDArray[np.float64], random: np.random.Generator) -> NDArray[np.float64]:
-        return deviations
+    def steps_near(
+        self, deviations: NDArray[np.float64], near: NDArray[np.bool_], random: np.random.Generator
+    ) -> tuple[Steps, Steps]:
+        return Steps.of(deviations, near), Steps.of_every_second(deviations, near)
 
     def _seen(self, states: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return outputs (count, m, r) of states (m, count, n)."""

@@ -93,31 +93,32 @@ def draw_beyond(
     keep : bool
         Whether the deviations are kept, for few outputs.
     """
-    m, r = process.seen.mean.shape
-    largest = max(16, int(MEMORY / (m * r)))
+    largest = max(16, int(MEMORY / process.drawn.mean.size))
     weights, near, coarser, kept = [], [], [], []
     while count > 0:
-        deviations, paths, weight = _paths_beyond(process, boundary, random, min(count, largest))
+        part = min(count, largest)
+        deviations, close, weight = _paths_beyond(process, boundary, random, part)
+        steps, every_second = process.steps_near(deviations, close, random)
         weights.append(weight)
-        near.append(sightings(paths, boundary, process.seen))
-        coarser.append(sightings(paths, boundary, process.seen, every=2))
+        near.append(sightings(part, steps, boundary, process.seen))
+        coarser.append(sightings(part, every_second, boundary, process.seen, every=2))
         if keep:
             kept.append(deviations)
-        count -= len(weight)
+        count -= part
     sighted = Sightings.joined(near), Sightings.joined(coarser)
     return Draws(process, np.concatenate(weights), *sighted, np.concatenate(kept) if keep else None)
 
 
 def _paths_beyond(
     process: Process, boundary: Boundary, random: np.random.Generator, count: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Return deviations on the grid drawn, paths on the grid seen, both (count, m, r), and weights."""
+) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.float64]]:
+    """Return deviations (count, m, r) on the grid drawn, where paths are near the boundary (count, m), and weights."""
     inner = boundary.at(slice(None, None, process.stride)).drawn_in(process.between)
     log_p = instant_probabilities(process, inner)
     log_sum = float(logsumexp(log_p))
     deviations = process.deviations(random, count)
     if not np.isfinite(log_sum):  # nothing ever comes near
-        return deviations, process.seen.mean + process.refined(deviations, random), np.zeros(count)
+        return deviations, np.zeros(deviations.shape[:2], bool), np.zeros(count)
     cumulative = np.cumsum(np.exp(log_p - log_sum).ravel())
     spread = (np.arange(count) + random.random(count)) / count * cumulative[-1]
     chosen = np.minimum(np.searchsorted(cumulative, spread, side="right"), cumulative.size - 1)
@@ -131,5 +132,6 @@ def _paths_beyond(
     deviations += gain[:, None, None] * process.covariances(points, outputs)
     drawn = process.drawn.mean + deviations
     number = (drawn > inner.upper).sum(axis=(1, 2)) + (drawn < inner.lower).sum(axis=(1, 2))
-    weight = np.exp(log_sum - np.log(np.maximum(number, 1)))
-    return deviations, process.seen.mean + process.refined(deviations, random), weight
+    close = inner.drawn_in(process.between)
+    near = ((drawn > close.upper) | (drawn < close.lower)).any(axis=2)
+    return deviations, near, np.exp(log_sum - np.log(np.maximum(number, 1)))

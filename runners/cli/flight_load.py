@@ -1,0 +1,128 @@
+"""The command ``flight-load``: the largest value of every response over the flight, with its odds, and limits."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.table import Table
+
+from ...model.errors import TimeRangeError, UnusedOptionError
+from ...model.files.numbers import parse_number
+from ..present.terminal import console
+from .job import Job, load_study, steps
+from .terminal import Changes, VehicleArgument, number, results_folder, whole
+
+if TYPE_CHECKING:
+    from ..flight_load.load import FlightLoad
+
+
+def flight_load(
+    vehicle: VehicleArgument,
+    window: Annotated[
+        str | None, typer.Option(help="BEGIN:END of the flight in s; the vehicle's default times without it.")
+    ] = None,
+    response: Annotated[list[str] | None, typer.Option(help="Response, several times; all without it.")] = None,
+    probability: Annotated[
+        list[float] | None,
+        typer.Option(parser=number, help="Chance with which the level is passed, several times; 0.00135 without it."),
+    ] = None,
+    limit: Annotated[
+        Path | None,
+        typer.Option(help="CSV: 'time [s]', 'station [m]' or both, then limits such as 'bending_moment [N m]'."),
+    ] = None,
+    sides: Annotated[str, typer.Option(help="both, upper or lower.")] = "both",
+    draws: Annotated[int, typer.Option(parser=whole, help="Paths of the importance sampling.")] = 2000,
+    seed: Annotated[int, typer.Option(parser=whole, help="Of the draws.")] = 0,
+    out: Annotated[Path | None, typer.Option(help="Folder for results; VEHICLE-flight-load without it.")] = None,
+    changes: Changes = None,
+) -> None:
+    """The load of the whole flight: levels that its largest values pass, exceedance, limits and margins."""
+    from ..flight_load.exceedance_figure import exceedance_figure
+    from ..flight_load.files import write_flight_loads
+    from ..flight_load.limit_table import Limits
+    from ..flight_load.load import DESIGN
+    from ..flight_load.margin_figure import margin_figure
+    from ..flight_load.request import checked_probabilities, checked_sides
+    from ..present.style import words, write_figure
+
+    asked, chosen = checked_probabilities(probability or [DESIGN]), checked_sides(sides)
+    flown = None if window is None else parse_window(window)
+    limits = None if limit is None else Limits.read(limit)
+    study = load_study(vehicle, changes, ["title", "default_times"] if window is None else ["title"])
+    names = study.checked_responses(response or None)
+    over_time = limits if limits is not None and limits.station is None else None
+    if over_time is not None and not set(over_time.values) & set(names):
+        raise UnusedOptionError(f"{limit} holds no limit of {', '.join(names)}; it has {', '.join(over_time.values)}")
+    job = Job(out or results_folder(vehicle, "flight-load"))
+    title = study.vehicle_for("a flight's load").title
+    loads = []
+    with steps("loads of the flight", len(names)) as bar:
+        for name in names:
+            own = over_time if over_time is not None and name in over_time.values else None
+            load = study.flight_load(name, flown, asked, limit=own, sides=chosen, draws=draws, seed=seed)
+            _ = load.exceedance, load.time_of_maximum, load.shares
+            loads.append(load)
+            bar.done(words(name))
+    job.replace_earlier("flight-load", study.system.name)
+    job.written += write_flight_loads(loads, job.folder)
+    with steps("figures", len(loads)) as bar:
+        for load in loads:
+            heading = f"{title}\nLargest {words(load.response)} of the flight"
+            job.written += write_figure(exceedance_figure(load, heading), job.folder, f"exceedance_{load.response}")
+            if load.limits is not None:
+                heading = f"{title}\n{words(load.response).capitalize()} and its limit"
+                job.written += write_figure(margin_figure(load, heading), job.folder, f"limit_{load.response}")
+            bar.done()
+    print_loads(loads)
+    job.end()
+
+
+def parse_window(text: str) -> tuple[float, float]:
+    """Return begin and end of a window from BEGIN:END in seconds.
+
+    Raises
+    ------
+    TimeRangeError
+    """
+    try:
+        begin, end = (parse_number(part) for part in text.split(":"))
+    except ValueError:
+        raise TimeRangeError(f"'{text}' is no window; write BEGIN:END in seconds, such as 40:100") from None
+    return begin, end
+
+
+def print_loads(loads: list[FlightLoad]) -> None:
+    """Print the levels of flights beside those of their worst instants, and what limits leave."""
+    from ..present.style import display, words
+
+    begin, end = loads[0].window
+    title = f"Largest values of a flight, {begin:g} to {end:g} s"
+    table = Table("response", "passed with", "level", "95 %", "worst instant", "ratio", title=title)
+    for load in loads:
+        for p, found, instant in zip(load.probabilities, load.levels, load.instant_level.values, strict=True):
+            factor, unit = display(load.unit, found.value)
+            low, high = (factor * x for x in found.interval)
+            table.add_row(
+                words(load.response), f"{p:g}", f"{factor * found.value:.4g} {unit}", f"{low:.4g} to {high:.4g}",
+                f"{factor * instant:.4g} {unit}", f"{found.value / instant:.3f}",
+            )  # fmt: skip
+    console.print(table)
+    table = Table("response", title="Shares of the sources where the level is reached")
+    for source in loads[0].of.case.system.sources:
+        table.add_column(words(source), justify="right")
+    for load in loads:
+        shares = load.shares["share"].isel(probability=0).values
+        table.add_row(words(load.response), *(f"{100 * share:.2f} %" for share in shares))
+    console.print(table)
+    for load in loads:
+        if load.limits is not None:
+            passage = load.passage
+            p = passage.probability
+            console.print(
+                f"The limit of {words(load.response)} is passed by {p.value:.3g} of flights (95 %: {p.interval[0]:.2g} "
+                f"to {p.interval[1]:.2g}; worst instant alone {p.largest_instant:.2g}); at {passage.design:g} the "
+                f"margin of safety is {passage.margin_of_safety:+.3f}.",
+                highlight=False, soft_wrap=True,
+            )  # fmt: skip

@@ -1,0 +1,90 @@
+"""A flight's loads as files: netCDF with one unit a variable, and CSV with units in a column."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Sequence
+from pathlib import Path
+
+import xarray as xr
+
+from ..present.files import write_whole
+from ..present.netcdf import RULE, one_unit_a_variable, with_conventions, write_netcdf
+from .load import FlightLoad
+
+LEVELS = ("flight_level", "flight_level_interval", "instant_level", "exceedance_level", "level_without")
+
+
+def write_flight_loads(loads: Sequence[FlightLoad], folder: Path) -> list[Path]:
+    """Write flight_load.nc, flight_load.csv (a row a response and probability) and exceedance.csv.
+
+    Parameters
+    ----------
+    loads : sequence of FlightLoad
+        Of one case and window, one a response.
+    folder : Path
+
+    Returns
+    -------
+    list of Path
+
+    Raises
+    ------
+    OutputFolderError
+    """
+    texts = {"flight_load.csv": _levels_csv(loads), "exceedance.csv": _exceedance_csv(loads)}
+    return [
+        write_netcdf(flight_dataset(loads), folder / "flight_load.nc"),
+        *(write_whole(folder / n, lambda p, t=t: p.write_text(t, encoding="utf-8")) for n, t in texts.items()),
+    ]
+
+
+def flight_dataset(loads: Sequence[FlightLoad]) -> xr.Dataset:
+    """Return the loads of several responses as files hold them, each variable with its own unit."""
+    parts = []
+    for load in loads:
+        part = load.to_dataset()
+        for name in LEVELS:
+            part[name].attrs = {RULE: "response", "long_name": part[name].attrs["long_name"]}
+        if load.limits is not None and load.response in load.limits.values:
+            passed, left = load.passage.probability, load.passage
+            part["limit_passage_probability"] = (
+                (),
+                passed.value,
+                {"units": "1", "long_name": "chance to pass a limit"},
+            )
+            part["limit_passage_error"] = ((), passed.standard_error, {"units": "1", "long_name": "standard error"})
+            part["margin_of_safety"] = ((), left.margin_of_safety, {"units": "1", "long_name": "limit over level, - 1"})
+        parts.append(part)
+    whole = xr.concat(parts, "response", combine_attrs="drop_conflicts", coords="minimal", compat="override")
+    whole = whole.assign_coords(response=[load.response for load in loads])
+    return with_conventions(one_unit_a_variable(whole, {"response": [load.unit for load in loads]}))
+
+
+def _levels_csv(loads: Sequence[FlightLoad]) -> str:
+    header = (
+        "response", "unit", "sides", "window_begin_s", "window_end_s", "probability", "flight_level", "lower_95",
+        "upper_95", "spacing_error", "instant_level",
+    )  # fmt: skip
+    rows: list[Sequence[object]] = [header]
+    for load in loads:
+        for p, found, instant in zip(load.probabilities, load.levels, load.instant_level.values, strict=True):
+            numbers = found.value, *found.interval, found.probability.spacing_error, instant
+            rows.append((load.response, load.unit, load.sides, *load.window, f"{p:g}", *(f"{x:.9e}" for x in numbers)))
+    return _csv(rows)
+
+
+def _exceedance_csv(loads: Sequence[FlightLoad]) -> str:
+    rows: list[Sequence[object]] = [("response", "unit", "level", "probability", "standard_error")]
+    for load in loads:
+        curve = load.exceedance
+        for level, p, error in zip(curve["level"].values, curve.values, curve["standard_error"].values, strict=True):
+            rows.append((load.response, load.unit, *(f"{x:.9e}" for x in (level, p, error))))
+    return _csv(rows)
+
+
+def _csv(rows: Sequence[Sequence[object]]) -> str:
+    buffer = io.StringIO()
+    csv.writer(buffer, lineterminator="\n").writerows(rows)
+    return buffer.getvalue()
