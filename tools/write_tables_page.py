@@ -27,7 +27,11 @@ TABLES: tuple[tuple[str, Sequence[c.Column]], ...] = (
     ("`[[loads]]`, for `options.p_delta`", c.p_delta_columns(1)),
     ("`[loads.local]`, for `options.local_angle_of_attack`", (c.TIME, *c.local_load_columns(1))),
     ("`[tables.local_aerodynamics]`, for the same", (c.TIME, *c.local_columns(1))),
+    ("`[loads.shear]`, the shear force at a station s", (c.TIME, *c.whole_shear_columns(1))),
+    ("`[loads.axial]`, the axial force at a station s", (c.TIME, *c.AXIAL)),
     ("`[tables.loads_along_vehicle]`, besides the columns of all `[[loads]]`", c.ALONG_ARGUMENTS),
+    ("`[tables.shear_along_vehicle]`, besides the columns of all `[loads.shear]`", c.ALONG_ARGUMENTS),
+    ("`[tables.axial_along_vehicle]`, besides the columns of all `[loads.axial]`", (*c.ALONG_ARGUMENTS, c.RADIUS)),
     ("`[control.accelerometer.modes]`, `[control.angle_of_attack.modes]`", (c.TIME, *c.mode_columns(1))),
     ("`[control.accelerometer.schedule]`, `[control.angle_of_attack.schedule]`", (c.TIME, *c.SCHEDULE)),
     ("`[wind.statistics]`", (c.ALTITUDE, *c.WIND)),
@@ -43,7 +47,9 @@ def page() -> str:
         "`tools/write_tables_page.py` writes this page from `model/vehicle/columns.py`, from which",
         "`ascentwind new-vehicle` takes the comments above its tables. Modes count from 1 (shown here for one",
         "mode), TANK is the name of a tank under `[[slosh]]`. x is metres forward of the gimbal plane, X_CG the",
-        "centre of gravity, s a load station, c'_N the local normal-force slope.",
+        "centre of gravity, s a load station, c'_N the local normal-force slope. Signs of loads: a bending moment",
+        "is positive where it turns the nose towards +Y; a shear force where it pushes the part forward of s",
+        "towards +Y; an axial force in compression.",
     ]
     for title, columns in TABLES:
         lines += ["", f"## {title}", "", "| column | sign | meaning |", "|---|---|---|"]

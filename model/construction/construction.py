@@ -14,6 +14,7 @@ from .consistency import (
     refuse_repeated_stations,
 )
 from .flight import AtmosphereFactors, Drag, EngineGroup, NormalForceComponent, PitchProgramme, Site
+from .outline import Outline
 from .structure import LumpedMass, Stiffness, Tank
 from .tank_shape import TankShape
 
@@ -51,6 +52,8 @@ class Construction:
     slosh_method : {'surface_radius', 'cylinder', 'potential'}
         Cylinder formulas with the radius of the free surface at the liquid's level, or with the tank's largest radius;
         or the first mode of potential flow in the tank's own shape.
+    outline : Outline or None
+        None: axial forces are not computed.
     """
 
     name: str
@@ -72,6 +75,7 @@ class Construction:
     load_stations: tuple[float, ...]
     end_time: float
     slosh_method: Literal["surface_radius", "cylinder", "potential"] = "surface_radius"
+    outline: Outline | None = None
 
     def __post_init__(self):
         places = {"gimbal_station_m": [self.gimbal_station], "sensor_station_m": [self.sensor_station]}
@@ -107,6 +111,15 @@ class Construction:
         for station in self.load_stations:
             if not self.aft_end < station < self.forward_end:
                 raise DataError(f"load station {station:g} m is not on the vehicle; choose one between its ends")
+        if self.outline is not None:
+            ends = self.outline.station[[0, -1]]
+            if ends[0] > self.aft_end or ends[1] < self.forward_end:
+                raise DataError(
+                    f"the outline is given from {ends[0]:g} to {ends[1]:g} m, the vehicle reaches from "
+                    f"{self.aft_end:g} to {self.forward_end:g} m; add stations"
+                )
+            for tank in self.tanks:
+                self.outline.require_around(tank)
         if not self.engines:
             raise DataError("the vehicle has no engines; add [[engines]]")
 

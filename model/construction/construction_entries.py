@@ -123,6 +123,7 @@ class ConstructionFile(Section):
     masses: FileEntry
     stiffness: FileEntry
     drag: FileEntry
+    outline: FileEntry | None = None
     atmosphere: FileEntry | None = None
     pitch: PitchEntry
     site: SiteEntry

@@ -26,6 +26,7 @@ from .construction_entries import (
     TankEntry,
 )
 from .flight import AtmosphereFactors, Drag, EngineGroup, NormalForceComponent, PitchProgramme, Site
+from .outline import Outline
 from .sizes import check_sizes
 from .structure import LumpedMass, Stiffness, Tank, TankSection
 
@@ -65,6 +66,7 @@ def load_construction(folder: Path, changes: Mapping[str, Any] | None = None) ->
     masses = _masses(file_inside(folder, entry.masses.file), entry.aft_end_m, entry.forward_end_m)
     stiffness = _stiffness(file_inside(folder, entry.stiffness.file))
     drag = _drag(file_inside(folder, entry.drag.file))
+    outline = None if entry.outline is None else _outline(file_inside(folder, entry.outline.file))
     atmosphere = None if entry.atmosphere is None else _atmosphere(file_inside(folder, entry.atmosphere.file))
     engines = tuple(_engine(folder, e) for e in entry.engines)
     normal_force = tuple(_normal_force(folder, e) for e in entry.normal_force)
@@ -96,6 +98,7 @@ def load_construction(folder: Path, changes: Mapping[str, Any] | None = None) ->
             load_stations=entry.load_stations_m,
             end_time=entry.end_time_s,
             slosh_method=entry.slosh_method,
+            outline=outline,
         )
     check_sizes(construction, toml)
     return construction
@@ -105,7 +108,7 @@ def construction_files(folder: Path) -> tuple[Path, ...]:
     """Return construction.toml and every file that it names, in its order, each once."""
     toml = file_inside(folder, CONSTRUCTION_FILE)
     entry = read_toml(toml, ConstructionFile)
-    parts = (entry.masses, entry.stiffness, entry.drag, entry.atmosphere, entry.pitch)
+    parts = (entry.masses, entry.stiffness, entry.drag, entry.outline, entry.atmosphere, entry.pitch)
     names = [p.file for p in (*parts, *entry.engines, *entry.normal_force) if p is not None]
     return (toml, *(file_inside(folder, name) for name in dict.fromkeys(names)))
 
@@ -184,6 +187,14 @@ def _warn_of_bridged_items(table: CsvTable) -> None:
                 PlausibilityWarning,
                 stacklevel=4,
             )
+
+
+def _outline(file: Path) -> Outline:
+    table = _read(file, "station", "m", "not decreasing", ("item", *_ORIGIN))
+    radius = table.column("radius", "m")
+    table.require_positive("radius", allow_zero=True)
+    with _located(file):
+        return Outline(table.columns["station"], radius)
 
 
 def _drag(file: Path) -> Drag:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..system.labels import Noise, State, block_of
 from ..system.linear_system import LinearSystem
-from ..system.names import WIND
+from ..system.names import UNDISTURBED, WIND
 from ..vehicle.biases import WIND_BIAS, check_biases
 from ..vehicle.vehicle import Vehicle
 from . import rigid_body
@@ -74,12 +74,13 @@ def assemble(vehicle: Vehicle, wind_start_covariance: np.ndarray) -> LinearSyste
         handles=handles,
     )
     derivative, output = deviated(vehicle, numbers, motion, equations)
+    has_axial = any(load.axial for load in vehicle.file.loads)
     return LinearSystem(
         name=vehicle.name,
         time=numbers.time,
         x=x,
         w=ca.vertcat(wind.white, *(process.white for process in deviations.values())),
-        u=mean_wind,
+        u=ca.vertcat(mean_wind, numbers.undisturbed) if has_axial else mean_wind,
         p=numbers.parameters.vector,
         v=tables.vector,
         derivative=derivative,
@@ -88,8 +89,8 @@ def assemble(vehicle: Vehicle, wind_start_covariance: np.ndarray) -> LinearSyste
         noises=_white_noises(wind.white.numel(), deviations),
         outputs=tuple(label for label, _ in responses),
         parameters=tuple(numbers.parameters.parameters),
-        input_names=(WIND,),
-        input_values=expected,
+        input_names=(WIND, UNDISTURBED) if has_axial else (WIND,),
+        input_values=ca.vertcat(expected, 1) if has_axial else expected,
         tables=numbers.groups,
         start_covariance=_start_covariance(states, wind_start_covariance, deviations),
         discontinuities=vehicle.discontinuities,

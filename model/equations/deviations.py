@@ -9,6 +9,7 @@ import casadi as ca
 
 from ..errors import DataError
 from ..vehicle.biases import CENTER_OF_GRAVITY_OFFSET, THRUST_MISALIGNMENT, vehicle_biases
+from ..vehicle.loads import SIDES, lateral_loads, load_name
 from ..vehicle.noise_loads import CENTER_OF_PRESSURE, deviating_tables, loading_deviations
 from ..vehicle.vehicle import Vehicle
 from .forces import Handles
@@ -25,7 +26,6 @@ class Undeviated:
     Attributes
     ----------
     states, rates, outputs : SX columns
-        The loads are the first outputs.
     angles : (2,) SX
         Angle of attack and engine angle in terms of the states.
     responses : tuple of str
@@ -105,8 +105,9 @@ def deviation_column(
             column += ca.jtimes(both, handles.moved, symbol)
     if column.is_zero():
         raise _refusal(vehicle, name, f"deviations of {', '.join(deviating)} change nothing in the equations")
-    at_mean = ca.vertcat(*(tables[n] for n in MEAN_TABLES), 0, 0)
-    symbols = ca.vertcat(motion.alpha, motion.beta, motion.attitude, handles.moved, handles.couple)
+    at_mean = ca.vertcat(*(tables[n] for n in MEAN_TABLES), 0, 0, 1)
+    angles = motion.alpha, motion.beta, motion.attitude
+    symbols = ca.vertcat(*angles, handles.moved, handles.couple, numbers.undisturbed)
     column = ca.substitute(column, symbols, at_mean)
     if ca.depends_on(column, equations.states):
         raise _refusal(
@@ -123,9 +124,16 @@ def _direct(vehicle: Vehicle, name: str, numbers: Numbers, motion: Motion, equat
     loading, form = loading_deviations(vehicle.file).get(name, ()), vehicle.file.options.noise_loads
     n = equations.states.numel()
     column = ca.SX.zeros(n + equations.outputs.numel())
-    for k, load in enumerate(vehicle.file.loads):
+    rows = {name: n + k for k, name in enumerate(equations.responses)}
+    for load in lateral_loads(vehicle.file):
         coefficients = numbers.tables.under(f"loads.{load.output}.")
-        column[n + k] = noise_load(loading, form, coefficients, numbers.tables, numbers.area, motion.alpha, motion.beta)
+        # a couple makes no shear but by the vehicle's answer to it, wherever it acts
+        where = "couple_aft" if load.is_shear and form == "couple_forward" else form
+        value = noise_load(loading, where, coefficients, numbers.tables, numbers.area, motion.alpha, motion.beta)
+        column[rows[load.output]] = value
+    for moment, radius in numbers.radii.items():
+        for side, sign in SIDES.items():
+            column[rows[load_name(moment, side)]] = sign * 2 / radius * column[rows[moment]]
     return column
 
 

@@ -52,8 +52,8 @@ def local_forces(
     return LocalForces(pressure * force, pressure * moment, ca.vertcat(ca.SX(0, 1), *modal))
 
 
-def local_bending_moment(tables: TableSymbols, output: str, attitude_rate: ca.SX, eta: ca.SX, eta_rate: ca.SX) -> ca.SX:
-    """What the local angle of attack adds to a load, the rigid body's reaction to it included, N m."""
+def local_load(tables: TableSymbols, output: str, attitude_rate: ca.SX, eta: ca.SX, eta_rate: ca.SX) -> ca.SX:
+    """What the local angle of attack adds to a load, the rigid body's reaction to it included, N m or N."""
     local = tables.under(f"{PREFIX}loads.{output}.")
     moment = local["attitude_rate"] * attitude_rate
     for i in range(eta.numel()):

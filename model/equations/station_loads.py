@@ -13,18 +13,33 @@ from ..errors import DataError, PlausibilityWarning
 from ..files.csv_table import read_csv_table
 from ..files.folder_files import file_inside
 from ..tables import Table
-from ..vehicle.columns import ALONG_ARGUMENTS, MOVED_LINE, OFFSET_MASS, TIME, Column, along_columns, p_delta_columns
+from ..vehicle.columns import (
+    ALONG_ARGUMENTS,
+    AXIAL,
+    RADIUS,
+    TIME,
+    Column,
+    along_columns,
+    by_need_columns,
+    whole_shear_columns,
+)
+from ..vehicle.loads import AXIAL_FORCE, BENDING_MOMENT, SHEAR_FORCE, load_name
 from ..vehicle.noise_loads import needed_columns
 from ..vehicle.vehicle import Vehicle
+from ..vehicle.vehicle_file import TableEntry
 
-KEY = "loads_along_vehicle"
+KEYS = {
+    BENDING_MOMENT: "loads_along_vehicle",
+    SHEAR_FORCE: "shear_along_vehicle",
+    AXIAL_FORCE: "axial_along_vehicle",
+}
 SAME_STATION = 1e-6  # m
 DIFFERENT = 1e-3  # of the largest coefficient
 
 
 @dataclass(frozen=True, eq=False)
 class StationLoads:
-    """Coefficients of the bending moment at stations.
+    """Coefficients of a load at stations.
 
     Attributes
     ----------
@@ -56,27 +71,49 @@ class StationLoads:
         return {name: np.array([table.polynomial(times) for table in tables]).T for name, tables in self.tables.items()}
 
 
-def load_station_loads(vehicle: Vehicle) -> StationLoads:
-    """Read the table that a vehicle names as ``tables.loads_along_vehicle``.
+def station_table(vehicle: Vehicle, load: str) -> TableEntry:
+    """Return the table of a load along the vehicle, one of ``KEYS``.
+
+    Raises
+    ------
+    DataError
+        If there is none.
+    """
+    entry: TableEntry | None = getattr(vehicle.file.tables, KEYS[load])
+    if entry is None:
+        raise DataError(
+            f"is missing, but the {load.replace('_', ' ')} along the vehicle needs it; 'ascentwind build-vehicle' "
+            "makes it",
+            file=vehicle.folder / "vehicle.toml",
+            column=f"tables.{KEYS[load]}",
+        )
+    return entry
+
+
+def load_station_loads(vehicle: Vehicle, load: str = BENDING_MOMENT) -> StationLoads:
+    """Read the table of a load along the vehicle.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+    load : {'bending_moment', 'shear_force', 'axial_force'}
 
     Raises
     ------
     DataError
         If there is none, if a column is missing, or if the stations differ from time to time.
     """
-    entry = vehicle.file.tables.loads_along_vehicle
-    if entry is None:
-        raise DataError(
-            "is missing, but the bending moment along the vehicle needs it; 'ascentwind build-vehicle' makes it",
-            file=vehicle.folder / "vehicle.toml",
-            column=f"tables.{KEY}",
-        )
+    entry, modes, tanks = station_table(vehicle, load), len(vehicle.bending), [tank.name for tank in vehicle.slosh]
     file: Path = file_inside(vehicle.folder, entry.file)
     csv = read_csv_table(file, TIME.name, TIME.unit, order="not decreasing")
-    columns = along_columns(len(vehicle.bending), [tank.name for tank in vehicle.slosh])
-    by_need = (MOVED_LINE, OFFSET_MASS, *p_delta_columns(len(vehicle.bending)))
-    needed = needed_columns(vehicle.file)[0]
-    columns = tuple(column for column in columns if column in needed or column not in by_need)
+    columns = {
+        BENDING_MOMENT: along_columns(modes, tanks),
+        SHEAR_FORCE: whole_shear_columns(modes),
+        AXIAL_FORCE: (*AXIAL, RADIUS),
+    }[load]
+    by_need = {column.name for column in by_need_columns(modes)}
+    needed = {column.name for column in needed_columns(vehicle.file)[0]}
+    columns = tuple(column for column in columns if column.name in needed or column.name not in by_need)
     for column in (*ALONG_ARGUMENTS, *columns):
         csv.column(column.name, column.unit)
     time, station = csv.columns["time"], csv.columns["station"]
@@ -97,18 +134,20 @@ def load_station_loads(vehicle: Vehicle) -> StationLoads:
 
     forward = csv.columns["forward_of_gimbal"][order].reshape(shape)[0]
     found = StationLoads(stations, forward, {column.name: tables(column) for column in columns})
-    _compare(vehicle, found, file)
+    _compare(vehicle, load, found, file)
     return found
 
 
-def _compare(vehicle: Vehicle, along: StationLoads, file: Path) -> None:
+def _compare(vehicle: Vehicle, quantity: str, along: StationLoads, file: Path) -> None:
     """Warn where a load's own table and the stations along the vehicle tell of different vehicles."""
     for load in vehicle.file.loads:
         k = int(np.argmin(np.abs(along.station - load.station_m)))
-        if abs(along.station[k] - load.station_m) > SAME_STATION:
+        entry = {BENDING_MOMENT: load.table, SHEAR_FORCE: load.shear, AXIAL_FORCE: load.axial}[quantity]
+        if entry is None or abs(along.station[k] - load.station_m) > SAME_STATION:
             continue
+        name = load_name(load.output, quantity)
         for column, tables in along.tables.items():
-            own, other = vehicle.tables.get(f"loads.{load.output}.{column}"), tables[k]
+            own, other = vehicle.tables.get(f"loads.{name}.{column}"), tables[k]
             if own is None:
                 continue
             times = other.argument[(other.argument >= own.argument[0]) & (other.argument <= own.argument[-1])]
@@ -118,7 +157,7 @@ def _compare(vehicle: Vehicle, along: StationLoads, file: Path) -> None:
             if off[worst] > DIFFERENT * np.abs(here).max():
                 warnings.warn(
                     f"{file}, column '{column}', t = {times[worst]:g} s: is {there[worst]:.6g} at station "
-                    f"{load.station_m:g} m, but {load.table.file} has {here[worst]:.6g}; build both again, or look at "
+                    f"{load.station_m:g} m, but {entry.file} has {here[worst]:.6g}; build both again, or look at "
                     "the column's unit, sign and rows",
                     PlausibilityWarning,
                     stacklevel=3,

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from ..tables import TableGroup
 from ..vehicle.biases import vehicle_biases
+from ..vehicle.loads import load_outputs
 from ..vehicle.noise_loads import deviating_tables
 from ..vehicle.vehicle import Vehicle
 
@@ -22,7 +23,7 @@ def structure_in_words(vehicle: Vehicle, states: int, groups: Sequence[TableGrou
         "transfer function orders": ", ".join(orders),
         "wind filter": f"order {vehicle.wind.shaping_filter.order}, {vehicle.wind.shaping_filter.noise_count} noises",
         "noise sources": ", ".join(f"{n} ({'white' if e.white else 'coloured'})" for n, e in vehicle.noise.items()),
-        "loads": ", ".join(load.output for load in file.loads),
+        "loads": ", ".join(load_outputs(file)),
         "extra outputs": ", ".join(file.options.extra_outputs) or "none",
         "full coupling": str(file.options.full_coupling).lower(),
         **({"local angle of attack": "true"} if file.options.local_angle_of_attack else {}),

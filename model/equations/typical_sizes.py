@@ -10,7 +10,7 @@ SCALES = {
     "bending_rate": 0.5,
     "slosh": 0.5,
     "slosh_rate": 1.0,
-    "dynamic_pressure_times_angle_of_attack": 1e3,
+    "q_alpha": 1e3,
     "bending_acceleration": 3.0,
     "slosh_acceleration": 3.0,
     "relative_deviation": 0.01,

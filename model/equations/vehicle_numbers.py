@@ -41,6 +41,10 @@ class Numbers:
         Factors on the wind's standard deviation and mean.
     sensors : dict of str to Sensor
         Of load relief.
+    radii : dict of str to SX
+        Of the vehicle (m), by the bending moment whose station they are at.
+    undisturbed : SX
+        The known input of value one that carries what no wind and no deviation makes: the axial force's mean.
     """
 
     time: ca.SX
@@ -58,6 +62,8 @@ class Numbers:
     sigma_scale: ca.SX
     mean_scale: ca.SX
     sensors: dict[str, Sensor]
+    radii: dict[str, ca.SX]
+    undisturbed: ca.SX
 
     @property
     def deviations(self) -> dict[str, NoiseProcess]:
@@ -92,6 +98,14 @@ class Numbers:
             sigma_scale=parameters.add("wind.sigma_scale", 1.0, "1", "factor on the wind's standard deviation"),
             mean_scale=parameters.add("wind.mean_scale", 1.0, "1", "factor on the mean wind"),
             sensors=sensor_symbols(vehicle.file.control.load_relief, modes, tables, parameters),
+            radii={
+                load.output: parameters.add(
+                    f"loads.{load.output}.radius", load.radius_m, "m", f"radius of the vehicle where {load.output} is"
+                )
+                for load in vehicle.file.loads
+                if load.radius_m is not None
+            },
+            undisturbed=ca.SX.sym("undisturbed"),
         )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import re
 
+UNDISTURBED = "undisturbed_flight"  # the known input of a vehicle, of value one, that carries its axial forces' means
 COMBINED = "combined"  # in every result, beside the sources: their sum
 WIND = "wind"  # the source of a vehicle's wind filter
 LONGEST = 200  # characters of a name or unit
@@ -22,14 +23,13 @@ TANK_NAMES = {
     "sensor": "the bending tables' columns at the sensor",
 }
 RESPONSE_NAMES = {
-    "angle_of_attack": "a response of every vehicle",
-    "engine_angle": "a response of every vehicle",
+    "angle_of_attack|engine_angle|q_alpha": "a response of every vehicle",
     "lateral_drift|drift_rate|dynamic_pressure_times_angle_of_attack": "one of options.extra_outputs",
     "relative_deviation_.*|center_of_gravity_offset|thrust_misalignment": "a deviation among the load_components of "
     "options.extra_outputs",
     r"attitude_rate|bending_(acceleration|displacement|rate)_\d+|slosh_(acceleration|displacement)_.*": "one of the "
     "load_components of options.extra_outputs",
-    "statistics|weighting_functions|bending_moment_along_vehicle": "a file of the results",
+    "statistics|weighting_functions|.*_along_vehicle": "a file of the results",
 }
 
 

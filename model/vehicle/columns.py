@@ -94,6 +94,11 @@ def p_delta_columns(modes: int) -> tuple[Column, ...]:
     )
 
 
+def by_need_columns(modes: int) -> tuple[Column, ...]:
+    """Return the columns of a bending moment that deviations and P-delta ask for."""
+    return (MOVED_LINE, OFFSET_MASS, *p_delta_columns(modes))
+
+
 def bending_columns(tanks: Sequence[str]) -> tuple[Column, ...]:
     """Return the columns of a bending mode."""
     return (
@@ -166,6 +171,52 @@ def local_load_columns(modes: int) -> tuple[Column, ...]:
     )
 
 
+# of a load's shear force: as of its moment, without the lever arm
+SHEAR_REACTION = (
+    Column("first_moment", "kg", "0", "S_1 of the shear force: mass forward of s"),
+    Column("second_moment", "kg m", "", "S_2 of it: mass forward of s times x - X_CG"),
+)
+AXIAL = (
+    Column("mass_forward", "kg", "0", "mass forward of s with all liquid"),
+    Column("drag_forward", "1", "0", "share of the axial drag that acts forward of s"),
+)
+RADIUS = Column("radius", "m", "0", "of the vehicle's outline at s")
+
+
+def shear_by_need_columns(modes: int) -> tuple[Column, ...]:
+    """Return the columns of a shear force that deviations and P-delta ask for."""
+    metre = "dV'_alpha/dX_CP: shear force for each rad and metre that the air force moves"
+    offset = "-S_2 mass / I_ZZ: shear force for each m of offset and m/s2 along the axis"
+    bent = "shear force for each m of mode {} and m/s2 of thrust over mass"
+    return (
+        Column(MOVED_LINE.name, "N/m/rad", "", metre),
+        Column(OFFSET_MASS.name, "kg/m", "", offset),
+        *(Column(column.name, "kg/m", "", bent.format(i)) for i, column in enumerate(p_delta_columns(modes), start=1)),
+    )
+
+
+def shear_columns(modes: int) -> tuple[Column, ...]:
+    """Return the columns of a shear force; slosh acts through the tanks' own tables."""
+    return (
+        Column("angle_of_attack", "N/rad", "", "V'_alpha: shear force for each rad of angle of attack"),
+        Column("engine_angle", "N/rad", "", "V'_beta: shear force for each rad of engine angle"),
+        *(Column(f"bending_{i}", "kg", "", f"V'_eta: shear force for each m/s2 of mode {i}") for i in _count(modes)),
+    )
+
+
+def local_shear_columns(modes: int) -> tuple[Column, ...]:
+    """Return the columns of a shear force for the local angle of attack."""
+    return (
+        Column("attitude_rate", "N s/rad", "", "shear force for each rad/s of turning"),
+        *(Column(f"bending_displacement_{i}", "N/m", "", f"shear force for each m of mode {i}") for i in _count(modes)),
+        *(Column(f"bending_rate_{i}", "N s/m", "", f"shear force for each m/s of mode {i}") for i in _count(modes)),
+    )
+
+
+def _count(modes: int) -> range:
+    return range(1, modes + 1)
+
+
 ALONG_ARGUMENTS = (
     TIME,
     Column("station", "m", "", "of the vehicle"),
@@ -174,8 +225,15 @@ ALONG_ARGUMENTS = (
 
 
 def along_columns(modes: int, tanks: Sequence[str]) -> tuple[Column, ...]:
-    """Return the coefficient columns of the loads along the vehicle."""
+    """Return the coefficient columns of the bending moment along the vehicle."""
     return (
-        *load_columns(modes, tanks), *REACTION, MOVED_LINE, OFFSET_MASS, *p_delta_columns(modes),
+        *load_columns(modes, tanks),
+        *REACTION,
+        *by_need_columns(modes),
         *local_load_columns(modes),
-    )  # fmt: skip
+    )
+
+
+def whole_shear_columns(modes: int) -> tuple[Column, ...]:
+    """Return the coefficient columns of a table of shear forces, at a station or along the vehicle."""
+    return (*shear_columns(modes), *SHEAR_REACTION, *shear_by_need_columns(modes), *local_shear_columns(modes))

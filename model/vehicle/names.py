@@ -7,6 +7,7 @@ from typing import TypeVar
 
 from ..system.names import NOISE_NAMES, RESPONSE_NAMES, TANK_NAMES, taken_by
 from .biases import vehicle_biases
+from .loads import load_outputs
 from .vehicle_file import TableEntry, VehicleFile
 
 Item = TypeVar("Item")
@@ -31,7 +32,7 @@ def name_faults(file: VehicleFile) -> Iterator[tuple[str, str]]:
     names = [part.format(tank.name) for tank in file.slosh for part in ("slosh_{}", "slosh_rate_{}")]
     if (name := repeated(names)) and not repeated([tank.name for tank in file.slosh]):
         yield "slosh", f"two tanks make one state '{name}'; rename the one whose name begins with 'rate_'"
-    if name := repeated([load.output for load in file.loads]):
+    if name := repeated(load_outputs(file)):
         yield "loads", f"two loads have the same output name '{name}'; rename one"
     for key, names in (
         *((f"noise.{name}.tables", noise.tables) for name, noise in file.noise.items()),
@@ -57,3 +58,7 @@ def _tables(file: VehicleFile) -> Iterator[tuple[str, TableEntry]]:
     for kind in ("bending", "slosh", "loads"):
         for i, part in enumerate(getattr(file, kind)):
             yield f"{kind}.{i}.table", part.table
+    for i, load in enumerate(file.loads):
+        for name in ("local", "shear", "axial"):
+            if table := getattr(load, name):
+                yield f"loads.{i}.{name}", table

@@ -39,6 +39,7 @@ COEFFICIENTS = {  # column of a load's table that a deviating table multiplies
     "dynamic_pressure": "angle_of_attack",
     "normal_force_slope": "angle_of_attack",
 }
+AXIAL_FORCES = ("thrust", "axial_drag", "mass")
 CENTER_OF_PRESSURE = "center_of_pressure"
 IN_PLACE = (CENTER_OF_GRAVITY_OFFSET, THRUST_MISALIGNMENT)  # biases that deviate no table
 MASSES_IN_PLACE = ("center_of_gravity", "attach_point")  # a load's table cannot tell which masses move with these
@@ -60,6 +61,22 @@ def loading_deviations(file: VehicleFile) -> dict[str, tuple[str, ...]]:
     found = {name: tuple(t for t in tables if t in forces) for name, tables in deviating_tables(file).items()}
     of_axis = {name: (name,) for name in vehicle_biases(file) if name in IN_PLACE}
     return {name: tables for name, tables in found.items() if tables} | of_axis
+
+
+def component_deviations(file: VehicleFile) -> tuple[str, ...]:
+    """Return the noises and biases that load stations by themselves, across the axis or along it."""
+    along = deviating_tables(file).items() if has_axial(file) else ()
+    return tuple(dict.fromkeys((*loading_deviations(file), *(name for name, tables in along if axial_tables(tables)))))
+
+
+def has_axial(file: VehicleFile) -> bool:
+    """Return whether the vehicle knows axial forces, at a station or along the vehicle."""
+    return file.tables.axial_along_vehicle is not None or any(load.axial for load in file.loads)
+
+
+def axial_tables(tables: Iterable[str]) -> tuple[str, ...]:
+    """Return those of the tables that make the axial force."""
+    return tuple(table for table in tables if table in AXIAL_FORCES)
 
 
 def needed_columns(file: VehicleFile) -> tuple[tuple[Column, ...], tuple[Column, ...]]:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ..deprecation import warn_deprecated
 from ..errors import DataError, DataErrorCollector, PlausibilityWarning, WindWarning, suggestion
 from ..files.csv_table import CsvTable, read_csv_table
 from ..files.folder_files import file_inside
@@ -23,13 +24,11 @@ from ..wind.statistics import WindModel, check_plausible, closed_form_filter, re
 from .columns import (
     AERODYNAMICS,
     ALTITUDE,
+    AXIAL,
     GAINS,
-    MOVED_LINE,
     MOVED_MODE,
-    OFFSET_MASS,
     PREFIX,
     PROPULSION,
-    REACTION,
     RIGID_BODY,
     SCHEDULE,
     SLOSH,
@@ -38,13 +37,11 @@ from .columns import (
     WIND,
     Column,
     bending_columns,
-    load_columns,
     local_columns,
-    local_load_columns,
     mode_columns,
-    p_delta_columns,
 )
 from .coverage import check_schedule, check_wind, loaded_flight
+from .loads import AXIAL_FORCE, lateral_loads, load_name
 from .names import name_faults
 from .noise_loads import check_noises, form_is_open, form_of_tables, needed_columns, needed_for
 from .plausibility import check_plausibility
@@ -53,6 +50,7 @@ from .vehicle import TableSource, Vehicle
 from .vehicle_file import TableEntry, VehicleFile, WindEntry, WindRecordEntry, read_vehicle_file
 
 REGULAR = 1.5  # times the usual step: in a table whose other steps are shorter, rows were lost at a longer one
+FORMER_Q_ALPHA = "dynamic_pressure_times_angle_of_attack"
 
 
 def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehicle:
@@ -85,6 +83,8 @@ def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehi
         raise DataError(f"holds no {VEHICLE_FILE}; start from 'ascentwind new-vehicle DIR --from as504'", file=folder)
     file = read_vehicle_file(file_inside(folder, VEHICLE_FILE), changes)
     _refuse_unused(changes or {}, file, toml)
+    if FORMER_Q_ALPHA in file.options.extra_outputs:
+        warn_deprecated(f"the extra output {FORMER_Q_ALPHA}", "q_alpha, which every vehicle has")
     reader = _Reader(folder, toml, file)
     reader.collector.errors += [DataError(why, file=toml, column=key) for key, why in name_faults(file)]
     for name, columns in (
@@ -103,18 +103,24 @@ def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehi
         reader.add(f"bending.{i}", mode.table, (*bending_columns(tanks), *of_modes), f"bending.{i}.", (MOVED_MODE,))
     for tank in file.slosh:
         reader.add(f"slosh.{tank.name}", tank.table, SLOSH, f"slosh.{tank.name}.")
-    for load in file.loads:
-        columns = dict.fromkeys((*load_columns(len(file.bending), tanks), *of_loads))
+    modes = len(file.bending)
+    for load in lateral_loads(file):
+        by_need, needed = load.by_need(modes), {column.name for column in of_loads}
+        columns = dict.fromkeys((*load.columns(modes, tanks), *(c for c in by_need if c.name in needed)))
         if file.options.slosh_reaction:
-            if load.forward_of_gimbal_m is None:
+            if load.station.forward_of_gimbal_m is None:
                 raise DataError(
                     "is missing, but options.slosh_reaction needs it; give metres forward of the gimbal plane",
                     file=toml,
                     column=f"loads.{load.output}.forward_of_gimbal_m",
                 )
-            columns |= dict.fromkeys(REACTION)
-        unused = (*REACTION, MOVED_LINE, OFFSET_MASS, *p_delta_columns(len(file.bending)))
+            columns |= dict.fromkeys(load.reaction)
+        unused = (*by_need, *(load.local_columns(modes) if load.is_shear else ()))
         reader.add(f"loads.{load.output}", load.table, tuple(columns), f"loads.{load.output}.", unused)
+    for entry in file.loads:
+        if entry.axial:
+            output = load_name(entry.output, AXIAL_FORCE)
+            reader.add(f"loads.{output}", entry.axial, AXIAL, f"loads.{output}.")
     if file.options.local_angle_of_attack:
         _add_local(reader, file)
     wind = None
@@ -213,11 +219,12 @@ def _add_local(reader: _Reader, file: VehicleFile) -> None:
     if file.tables.local_aerodynamics is None:
         raise DataError(missing, file=reader.toml, column="tables.local_aerodynamics")
     reader.add("local_aerodynamics", file.tables.local_aerodynamics, local_columns(modes), PREFIX)
-    for load in file.loads:
+    for load in lateral_loads(file):
         if load.local is None:
             raise DataError(missing, file=reader.toml, column=f"loads.{load.output}.local")
         name = f"{PREFIX}loads.{load.output}"
-        reader.add(name, load.local, local_load_columns(modes), f"{name}.")
+        rest = (*load.columns(modes, ()), *load.by_need(modes)) if load.is_shear else ()
+        reader.add(name, load.local, load.local_columns(modes), f"{name}.", rest)
 
 
 class _Reader:

@@ -11,7 +11,7 @@ def table_columns(file: VehicleFile) -> dict[str, tuple[Column, ...]]:
     """Return by file name every column that a table of a vehicle has a use for, its argument first."""
     modes, tanks = len(file.bending), [tank.name for tank in file.slosh]
     tables, control = file.tables, file.control
-    by_option = (*c.REACTION, c.MOVED_LINE, c.OFFSET_MASS, *c.p_delta_columns(modes))
+    by_option = (*c.REACTION, *c.by_need_columns(modes))
     found = {
         tables.rigid_body.file: c.RIGID_BODY,
         tables.trajectory.file: c.TRAJECTORY,
@@ -21,6 +21,8 @@ def table_columns(file: VehicleFile) -> dict[str, tuple[Column, ...]]:
         **{mode.table.file: (*c.bending_columns(tanks), c.MOVED_MODE) for mode in file.bending},
         **{tank.table.file: c.SLOSH for tank in file.slosh},
         **{load.table.file: (*c.load_columns(modes, tanks), *by_option) for load in file.loads},
+        **{load.shear.file: c.whole_shear_columns(modes) for load in file.loads if load.shear},
+        **{load.axial.file: c.AXIAL for load in file.loads if load.axial},
         **{load.local.file: c.local_load_columns(modes) for load in file.loads if load.local},
         **{sensor.modes.file: c.mode_columns(modes) for sensor in control.load_relief.values() if sensor.modes},
         **{sensor.schedule.file: c.SCHEDULE for sensor in control.load_relief.values() if sensor.schedule},
@@ -30,4 +32,8 @@ def table_columns(file: VehicleFile) -> dict[str, tuple[Column, ...]]:
     found = {name: (c.TIME, *columns) for name, columns in found.items()}
     if tables.loads_along_vehicle:
         found[tables.loads_along_vehicle.file] = (*c.ALONG_ARGUMENTS, *c.along_columns(modes, tanks))
+    if tables.shear_along_vehicle:
+        found[tables.shear_along_vehicle.file] = (*c.ALONG_ARGUMENTS, *c.whole_shear_columns(modes))
+    if tables.axial_along_vehicle:
+        found[tables.axial_along_vehicle.file] = (*c.ALONG_ARGUMENTS, *c.AXIAL, c.RADIUS)
     return found | {file.wind.statistics.file: (c.ALTITUDE, *c.WIND)}

@@ -103,13 +103,28 @@ class SloshEntry(Section):
 
 
 class LoadEntry(Section):
-    """A bending moment. ``forward_of_gimbal_m`` is ``station_m`` from the gimbal plane; slosh_reaction needs it."""
+    """A bending moment, and by ``shear`` and ``axial`` the shear force and axial force at its station.
+
+    ``forward_of_gimbal_m`` is ``station_m`` from the gimbal plane; all but the moment without slosh_reaction needs it.
+    With ``radius_m``, of the vehicle there, the axial force and the moment make an equivalent axial load.
+    """
 
     output: Annotated[Name, STRUCTURE]
     station_m: float
     forward_of_gimbal_m: float | None = None
     table: TableEntry
     local: TableEntry | None = None
+    shear: Annotated[TableEntry | None, STRUCTURE] = None
+    axial: Annotated[TableEntry | None, STRUCTURE] = None
+    radius_m: Annotated[Positive | None, STRUCTURE] = None
+
+    @model_validator(mode="after")
+    def _placed(self):
+        if (self.shear or self.axial) and self.forward_of_gimbal_m is None:
+            raise ValueError("has a table of shear or axial force, which need forward_of_gimbal_m; add it")
+        if self.radius_m is not None and self.axial is None:
+            raise ValueError("has radius_m, which is used with a table of the axial force; add axial or remove it")
+        return self
 
 
 class NoiseEntry(Section):
@@ -250,6 +265,8 @@ class TablesEntry(Section):
     aerodynamics: TableEntry
     local_aerodynamics: TableEntry | None = None
     loads_along_vehicle: TableEntry | None = None
+    shear_along_vehicle: TableEntry | None = None
+    axial_along_vehicle: TableEntry | None = None
 
 
 class VehicleFile(Section):

@@ -16,6 +16,7 @@ from ...model.construction import Construction
 from ...model.construction.construction_file import CONSTRUCTION_FILE, construction_files, load_construction
 from ...model.errors import DataError, OutputFolderError
 from ...model.files.folder_files import file_inside, unsafe_to_copy
+from ...model.vehicle.noise_loads import has_axial
 from ...model.vehicle.plausibility import station_in_name
 from ...model.vehicle.reader import VEHICLE_FILE
 from ...model.vehicle.trial_load import load_trial
@@ -141,6 +142,12 @@ def check_agreement(toml: Path, file: VehicleFile, construction: Construction) -
                 f"from {aft:g} to {forward:g} m",
                 f"control.{name}.position_m",
             )
+    outline = construction.outline
+    if outline is None and has_axial(file):
+        refuse(
+            f"has a table of the axial force, which needs [outline] in {CONSTRUCTION_FILE}; add it or remove the table",
+            "tables.axial_along_vehicle" if file.tables.axial_along_vehicle else "loads",
+        )
     for i, load in enumerate(file.loads):
         near = [s for s in construction.load_stations if abs(s - load.station_m) < POSITION_TOLERANCE]
         if not near:
@@ -148,12 +155,22 @@ def check_agreement(toml: Path, file: VehicleFile, construction: Construction) -
                 f"{load.station_m:g} m is not one of load_stations_m in {CONSTRUCTION_FILE}; add it there",
                 f"loads.{i}.station_m",
             )
-        named = station_in_name(load.table.file)
-        if named is not None and not named[0] <= load.station_m <= named[1]:
-            refuse(
-                f"is {load.table.file}, but would hold station {load.station_m:g} m; name it after that station",
-                f"loads.{i}.table.file",
-            )
+        for key in ("table", "local", "shear", "axial"):
+            entry = getattr(load, key)
+            named = None if entry is None else station_in_name(entry.file)
+            if named is not None and not named[0] <= load.station_m <= named[1]:
+                refuse(
+                    f"is {entry.file}, but would hold station {load.station_m:g} m; name it after that station",
+                    f"loads.{i}.{key}.file",
+                )
+        if load.radius_m is not None and outline is not None:
+            radius = float(outline.at(load.station_m))
+            if abs(load.radius_m - radius) > POSITION_TOLERANCE:
+                refuse(
+                    f"is {load.radius_m:g}, but the outline of {CONSTRUCTION_FILE} has {radius:.9g} m at station "
+                    f"{load.station_m:g} m; make them equal",
+                    f"loads.{i}.radius_m",
+                )
         forward = construction.forward_of_gimbal(load.station_m)
         if load.forward_of_gimbal_m is not None and abs(load.forward_of_gimbal_m - forward) > POSITION_TOLERANCE:
             refuse(
@@ -232,10 +249,14 @@ def table_entries(file: VehicleFile) -> dict[str, TableEntry]:
         "tables.aerodynamics": tables.aerodynamics,
         "tables.local_aerodynamics": tables.local_aerodynamics,
         "tables.loads_along_vehicle": tables.loads_along_vehicle,
+        "tables.shear_along_vehicle": tables.shear_along_vehicle,
+        "tables.axial_along_vehicle": tables.axial_along_vehicle,
         **{f"bending.{i}.table": mode.table for i, mode in enumerate(file.bending)},
         **{f"slosh.{tank.name}.table": tank.table for tank in file.slosh},
         **{f"control.{name}.modes": sensor.modes for name, sensor in file.control.load_relief.items()},
         **{f"loads.{load.output}.table": load.table for load in file.loads},
         **{f"loads.{load.output}.local": load.local for load in file.loads},
+        **{f"loads.{load.output}.shear": load.shear for load in file.loads},
+        **{f"loads.{load.output}.axial": load.axial for load in file.loads},
     }
     return {key: entry for key, entry in found.items() if entry is not None}

@@ -1,7 +1,7 @@
-"""Bending-moment coefficients at any stations: forces forward of a station less the inertia of what lies there.
+"""Load coefficients at any stations: forces forward of a station less the inertia of what lies there.
 
 With s the station, x metres forward of the gimbal plane and integrals over x > s, a lateral force of density f(x)
-on the free vehicle makes the moment
+on the free vehicle makes the bending moment
 
     L[f] = int (x - s) f dx - S_1 F / m - S_2 M / I,    F = int_all f dx,  M = int_all (x - X_CG) f dx
 
@@ -16,17 +16,27 @@ metre gives dM'_alpha/dX_CP = L[-q A dc'_N/dx] = N(s) - S_2 / I N, by parts, N(s
 Forces along the axis load a station where masses or the axis lie beside it. A mass e beside the thrust axis pulls with
 -A_X mu there: e A_X [int mu dx - S_2 m / I]. On an axis bent by Y the inertia -a mu and the thrust m a at the gimbal
 (a = F_TX / m, drag spread as the mass) make a [int mu (Y - Y(s)) dx + S_2 m Y(0) / I], less m (Y(0) - Y(s)) aft of it.
+
+The shear force is the same functional with 1 in the place of the lever arm x - s, and no couples: V = -dM/ds but for
+the rotary inertia, which loads a station by couples. Its S_1 is the mass forward of s, and dV'_alpha/dX_CP =
+q A c'_N(s) - S_2 / I N. The axial force, compression positive, is what pushes the part forward of s along the axis:
+its inertia, mass forward times A_X, and its drag, less the thrust that acts forward of s (that is: aft of the gimbal
+plane).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...model.errors import DataError
+from ...model.vehicle.columns import AXIAL, REACTION, Column, by_need_columns, whole_shear_columns
+from ...model.vehicle.columns import load_columns as moment_columns
+from ...model.vehicle.columns import local_load_columns as local_moment_columns
 from .line_integrals import Line
 
 LARGEST_IMBALANCE = 1e-6
@@ -44,6 +54,8 @@ class LoadedVehicle:
         per length (kg m).
     normal_force : (points,) array
         q A c'_N (N/rad/m).
+    normal_force_at_stations : (s,) array
+        The same at the stations of the loads, or just forward of them where it jumps.
     control_thrust : float
         N, at the gimbal plane.
     relative_velocity : float
@@ -58,6 +70,7 @@ class LoadedVehicle:
     mass: NDArray[np.float64]
     rotary_inertia: NDArray[np.float64]
     normal_force: NDArray[np.float64]
+    normal_force_at_stations: NDArray[np.float64]
     control_thrust: float
     relative_velocity: float
     displacement: NDArray[np.float64]
@@ -68,7 +81,9 @@ class LoadedVehicle:
 
 @dataclass(frozen=True, eq=False)
 class LoadCoefficients:
-    """What makes the bending moment at stations; columns by the names of a load's table.
+    """What makes the bending moment or shear force at stations; columns by the names of a load's table.
+
+    Units are those of the moment; of the shear force each is divided by m.
 
     Attributes
     ----------
@@ -88,6 +103,8 @@ class LoadCoefficients:
         N m s/rad; this and the next two by the local angle of attack.
     bending_displacement, bending_rate : (modes, s) arrays
         N, N s.
+    inertia : float
+        Of the whole vehicle about its centre of gravity, kg m2, with which S_2 goes.
     """
 
     angle_of_attack: NDArray[np.float64]
@@ -102,53 +119,116 @@ class LoadCoefficients:
     attitude_rate: NDArray[np.float64]
     bending_displacement: NDArray[np.float64]
     bending_rate: NDArray[np.float64]
+    inertia: float
+
+    def with_inertia(self, inertia: float) -> LoadCoefficients:
+        """Return the coefficients with S_2 in proportion to the vehicle's own moment of inertia, kg m2.
+
+        The line's masses are uniform in each element, and its moment of inertia some 1e-4 another one; in the equations
+        S_2 stands over the vehicle's, and together they close at both ends.
+        """
+        return replace(self, second_moment=self.second_moment * inertia / self.inertia, inertia=inertia)
 
 
 def load_coefficients(vehicle: LoadedVehicle, stations: NDArray[np.float64]) -> LoadCoefficients:
-    """Return the coefficients at stations (m forward of the gimbal plane, edges of the vehicle's line).
+    """Return the bending moment's coefficients at stations (m forward of the gimbal plane, edges of the line).
 
     Raises
     ------
     DataError
         If a mode is not orthogonal to the rigid motion of the masses: it belongs to another beam.
     """
-    line, mu, r = vehicle.line, vehicle.mass, vehicle.rotary_inertia
-    x = line.points
-    mass = float(line.total(mu))
-    center = float(line.total(x * mu)) / mass
-    inertia = float(line.total((x - center) ** 2 * mu + r))
+    line, mu, Y = vehicle.line, vehicle.mass, vehicle.displacement
 
     def moment_about_station(force: NDArray, couple: NDArray | float = 0.0) -> NDArray:
-        return line.forward(x * force + couple, stations) - stations * line.forward(force, stations)
+        return line.forward(line.points * force + couple, stations) - stations * line.forward(force, stations)
 
-    first = moment_about_station(mu)
-    second = moment_about_station((x - center) * mu, r)
+    forward, shape, at_gimbal = line.forward(mu, stations), line.at(Y, stations), line.at(Y, np.zeros(1))
+    thrust = np.where(stations < 0, line.total(mu) * (at_gimbal - shape), 0.0)
+    return _lateral(
+        vehicle,
+        moment_about_station,
+        moved_air=line.forward(vehicle.normal_force, stations),
+        engine=np.maximum(-stations, 0.0),
+        ahead=np.maximum(vehicle.slosh_point[:, None] - stations, 0.0),
+        pulled=forward,
+        bent=line.forward(mu * Y, stations) - shape * forward - thrust,
+    )
+
+
+def shear_coefficients(vehicle: LoadedVehicle, stations: NDArray[np.float64]) -> LoadCoefficients:
+    """Return the shear force's coefficients at stations; as :func:`load_coefficients`, positive towards +Y.
+
+    At a station that lies where a force acts, the gimbal plane or a slosh mass, those just forward of it.
+
+    Raises
+    ------
+    DataError
+    """
+    return _lateral(
+        vehicle,
+        lambda force, couple=0.0: vehicle.line.forward(force, stations),
+        moved_air=vehicle.normal_force_at_stations,
+        engine=np.where(stations < 0, 1.0, 0.0),
+        ahead=np.where(vehicle.slosh_point[:, None] > stations, 1.0, 0.0),
+    )
+
+
+class _Forward(Protocol):
+    """Sums a force and a couple, both per length (..., points), over the part forward of each station: (..., s)."""
+
+    def __call__(self, force: NDArray, couple: NDArray | float = 0.0) -> NDArray: ...
+
+
+def _lateral(
+    vehicle: LoadedVehicle,
+    forward: _Forward,
+    moved_air: NDArray,
+    engine: NDArray,
+    ahead: NDArray,
+    pulled: NDArray | float = 0.0,
+    bent: NDArray | float = 0.0,
+) -> LoadCoefficients:
+    """Return the coefficients of a load by how it sums what lies forward of a station.
+
+    Parameters
+    ----------
+    forward : callable
+    moved_air : (s,) array
+        What the normal force forward of the station gains for each metre that it moves, the vehicle held.
+    engine, ahead : (s,) and (tanks, s) arrays
+        What a unit force at the gimbal plane and at each slosh mass gives, the vehicle held.
+    pulled, bent : (s,) and (modes, s) arrays
+        What forces along the axis give by couples, the vehicle held: for each metre by which all masses lie beside the
+        thrust, and each m of a mode, per m/s2. Across the axis they give nothing.
+    """
+    line, mu, r = vehicle.line, vehicle.mass, vehicle.rotary_inertia
+    mass = float(line.total(mu))
+    center = float(line.total(line.points * mu)) / mass
+    arm = line.points - center
+    inertia = float(line.total(arm**2 * mu + r))
+    _refuse_modes_of_other_masses(vehicle, mass, center, inertia)
+    first, second, air = forward(mu), forward(arm * mu, r), vehicle.normal_force
+    turning = second * mass / inertia  # the answer to the couple of the vehicle's mass at a metre
 
     def free(density: NDArray) -> NDArray:
-        lateral, turning = line.total(density)[..., None], line.total((x - center) * density)[..., None]
-        return moment_about_station(density) - first * lateral / mass - second * turning / inertia
+        lateral, turning = line.total(density)[..., None], line.total(arm * density)[..., None]
+        return forward(density) - first * lateral / mass - second * turning / inertia
 
-    engine = vehicle.control_thrust * np.where(stations < 0, -stations, 0.0)
-    engine += vehicle.control_thrust * (second * center / inertia - first / mass)
-    _refuse_modes_of_other_masses(vehicle, mass, center, inertia)
-    ahead = np.maximum(vehicle.slosh_point[:, None] - stations, 0.0)
-    air = vehicle.normal_force
-    turning = second * mass / inertia
-    shape, at_gimbal = line.at(vehicle.displacement, stations), line.at(vehicle.displacement, np.zeros(1))
-    bent = line.forward(mu * vehicle.displacement, stations) - shape * line.forward(mu, stations)
     return LoadCoefficients(
         angle_of_attack=free(air),
-        engine_angle=engine,
-        center_of_pressure=line.forward(air, stations) - second * line.total(air) / inertia,
-        bending=-moment_about_station(mu * vehicle.displacement, r * vehicle.rotation),
+        engine_angle=vehicle.control_thrust * (engine + second * center / inertia - first / mass),
+        center_of_pressure=moved_air - second * line.total(air) / inertia,
+        bending=-forward(mu * vehicle.displacement, r * vehicle.rotation),
         slosh=-vehicle.slosh_mass[:, None] * ahead,
-        center_of_gravity_offset=line.forward(mu, stations) - turning,
-        p_delta=bent + turning * at_gimbal - np.where(stations < 0, mass * (at_gimbal - shape), 0.0),
+        center_of_gravity_offset=pulled - turning,
+        p_delta=bent + turning * line.at(vehicle.displacement, np.zeros(1)),
         first_moment=first,
         second_moment=second,
-        attitude_rate=-free(air * (x - center)) / vehicle.relative_velocity,
+        attitude_rate=-free(air * arm) / vehicle.relative_velocity,
         bending_displacement=free(air * vehicle.rotation),
         bending_rate=-free(air * vehicle.displacement) / vehicle.relative_velocity,
+        inertia=inertia,
     )
 
 
@@ -165,27 +245,60 @@ def _refuse_modes_of_other_masses(vehicle: LoadedVehicle, mass: float, center: f
         )
 
 
+def axial_coefficients(
+    vehicle: LoadedVehicle, stations: NDArray[np.float64], drag_forward: NDArray[np.float64]
+) -> dict[tuple[str, str], NDArray[np.float64]]:
+    """Return the columns of an axial force's table by (name, unit), each (s,), of the same stations.
+
+    Parameters
+    ----------
+    drag_forward : (s,) array
+        Share of the drag that acts forward of each station.
+    """
+    return _columns(AXIAL, {"mass_forward": vehicle.line.forward(vehicle.mass, stations), "drag_forward": drag_forward})
+
+
 def load_columns(coefficients: LoadCoefficients, tanks: Sequence[str]) -> dict[tuple[str, str], NDArray[np.float64]]:
-    """Return the columns of a load's table by (name, unit), each (s,)."""
-    c = coefficients
-    return {
-        ("angle_of_attack", "N m/rad"): c.angle_of_attack,
-        ("engine_angle", "N m/rad"): c.engine_angle,
-        **{(f"bending_{i}", "N s2"): row for i, row in enumerate(c.bending, start=1)},
-        **{(f"slosh_{tank}", "N s2"): row for tank, row in zip(tanks, c.slosh, strict=True)},
-        ("first_moment", "kg m"): c.first_moment,
-        ("second_moment", "kg m2"): c.second_moment,
-        ("center_of_pressure", "N/rad"): c.center_of_pressure,
-        ("center_of_gravity_offset", "kg"): c.center_of_gravity_offset,
-        **{(f"p_delta_{i}", "kg"): row for i, row in enumerate(c.p_delta, start=1)},
+    """Return the columns of a bending moment's table by (name, unit), each (s,)."""
+    columns = (
+        *moment_columns(len(coefficients.bending), tanks),
+        *REACTION,
+        *by_need_columns(len(coefficients.bending)),
+    )
+    return _columns(columns, _by_name(coefficients, tanks))
+
+
+def shear_columns(coefficients: LoadCoefficients) -> dict[tuple[str, str], NDArray[np.float64]]:
+    """Return the columns of a shear force's table by (name, unit), each (s,)."""
+    return _columns(whole_shear_columns(len(coefficients.bending)), _by_name(coefficients, ()))
+
+
+def _by_name(c: LoadCoefficients, tanks: Sequence[str]) -> dict[str, NDArray[np.float64]]:
+    numbered = {
+        "bending": c.bending,
+        "p_delta": c.p_delta,
+        "bending_displacement": c.bending_displacement,
+        "bending_rate": c.bending_rate,
     }
+    return {
+        "angle_of_attack": c.angle_of_attack,
+        "engine_angle": c.engine_angle,
+        **{f"{name}_{i}": row for name, rows in numbered.items() for i, row in enumerate(rows, start=1)},
+        **{f"slosh_{tank}": row for tank, row in zip(tanks, c.slosh, strict=bool(tanks))},
+        "first_moment": c.first_moment,
+        "second_moment": c.second_moment,
+        "center_of_pressure": c.center_of_pressure,
+        "center_of_gravity_offset": c.center_of_gravity_offset,
+        "attitude_rate": c.attitude_rate,
+    }
+
+
+def _columns(
+    columns: Iterable[Column], values: Mapping[str, NDArray[np.float64]]
+) -> dict[tuple[str, str], NDArray[np.float64]]:
+    return {(column.name, column.unit): values[column.name] for column in columns}
 
 
 def local_load_columns(coefficients: LoadCoefficients) -> dict[tuple[str, str], NDArray[np.float64]]:
-    """Return the columns of what the local angle of attack adds to a load, by (name, unit), each (s,)."""
-    c = coefficients
-    return {
-        ("attitude_rate", "N m s/rad"): c.attitude_rate,
-        **{(f"bending_displacement_{i}", "N"): row for i, row in enumerate(c.bending_displacement, start=1)},
-        **{(f"bending_rate_{i}", "N s"): row for i, row in enumerate(c.bending_rate, start=1)},
-    }
+    """Return the columns of what the local angle of attack adds to a bending moment, by (name, unit), each (s,)."""
+    return _columns(local_moment_columns(len(coefficients.bending)), _by_name(coefficients, ()))

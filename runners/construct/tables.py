@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...model.vehicle.columns import ALONG_ARGUMENTS
+from ...model.vehicle.columns import ALONG_ARGUMENTS, RADIUS
 from ...model.vehicle.vehicle_file import VehicleFile
-from .loads import load_columns, local_load_columns
+from .loads import load_columns, local_load_columns, shear_columns
 from .vehicle_numbers import VehicleNumbers
 
 Array = NDArray[np.float64]
@@ -78,12 +78,25 @@ def vehicle_tables(numbers: VehicleNumbers, file: VehicleFile) -> dict[str, tupl
         tables[load.table.file] = note, time | _load(numbers, station)
         if load.local is not None:
             tables[load.local.file] = f"{note}; local angle of attack", time | _local_load(numbers, station)
+        if load.shear is not None:
+            tables[load.shear.file] = f"{note}; shear force", time | _shear(numbers, station)
+        if load.axial is not None:
+            tables[load.axial.file] = f"{note}; axial force", time | _axial(numbers, station)
     if file.tables.local_aerodynamics is not None:
         note = "integrals of the normal force over products of 1, x - X_CG, mode displacements and slopes"
         tables[file.tables.local_aerodynamics.file] = note, time | _local_integrals(numbers)
     if file.tables.loads_along_vehicle is not None:
         note = "coefficients of the bending moment at stations along the whole vehicle"
-        tables[file.tables.loads_along_vehicle.file] = note, _along(numbers, file.start_time_s)
+        by_station = [_load(numbers, s) | _local_load(numbers, s) for s in range(numbers.stations.size)]
+        tables[file.tables.loads_along_vehicle.file] = note, _along(numbers, file.start_time_s, by_station)
+    if file.tables.shear_along_vehicle is not None:
+        note = "coefficients of the shear force at stations along the whole vehicle"
+        by_station = [_shear(numbers, s) for s in range(numbers.stations.size)]
+        tables[file.tables.shear_along_vehicle.file] = note, _along(numbers, file.start_time_s, by_station)
+    if file.tables.axial_along_vehicle is not None:
+        note = "coefficients of the axial force at stations along the whole vehicle"
+        by_station = [_axial(numbers, s) | _radius(numbers, s) for s in range(numbers.stations.size)]
+        tables[file.tables.axial_along_vehicle.file] = note, _along(numbers, file.start_time_s, by_station)
     return tables
 
 
@@ -156,14 +169,30 @@ def _local_load(numbers: VehicleNumbers, station: int) -> Columns:
     return {key: np.array([row[key][station] for row in rows]) for key in rows[0]}
 
 
-def _along(numbers: VehicleNumbers, start: float) -> Columns:
+def _shear(numbers: VehicleNumbers, station: int) -> Columns:
+    rows = [shear_columns(row) for row in numbers.shears]
+    return {key: np.array([row[key][station] for row in rows]) for key in rows[0]}
+
+
+def _axial(numbers: VehicleNumbers, station: int) -> Columns:
+    assert numbers.axial is not None  # checked before the build
+    return {key: np.array([row[key][station] for row in numbers.axial]) for key in numbers.axial[0]}
+
+
+def _radius(numbers: VehicleNumbers, station: int) -> Columns:
+    construction = numbers.construction
+    assert construction.outline is not None
+    radius = construction.outline.at(numbers.stations[station] + construction.gimbal_station)
+    return {(RADIUS.name, RADIUS.unit): np.full(numbers.flight.time.size, float(radius))}
+
+
+def _along(numbers: VehicleNumbers, start: float, by_station: Sequence[Columns]) -> Columns:
     """Return the loads of all stations, time by time from the last row before the start of the model on."""
     times, stations = numbers.flight.time, numbers.stations
     times = times[max(0, int(np.searchsorted(times, start, side="right")) - 1) :]
     gimbal = numbers.construction.gimbal_station
     values = (np.repeat(times, stations.size), *(np.tile(x, times.size) for x in (stations + gimbal, stations)))
     arguments = {(column.name, column.unit): value for column, value in zip(ALONG_ARGUMENTS, values, strict=True)}
-    by_station = [_load(numbers, s) | _local_load(numbers, s) for s in range(stations.size)]
     return arguments | {
         key: np.array([found[key][-times.size :] for found in by_station]).T.ravel() for key in by_station[0]
     }

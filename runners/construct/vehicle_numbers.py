@@ -13,7 +13,7 @@ from . import aerodynamics
 from .ascent.mean_flight import MeanFlight, fly
 from .beam.modes import ModeHistory, followed_modes
 from .line_integrals import Line
-from .loads import LoadCoefficients, LoadedVehicle, load_coefficients
+from .loads import LoadCoefficients, LoadedVehicle, axial_coefficients, load_coefficients, shear_coefficients
 from .mass.line import mass_line, rotary_line
 from .mass.properties import MassProperties, mass_properties
 from .slosh import SloshHistory, slosh_history
@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 
 STEPS = ("mean flight", "mass properties", "aerodynamics", "slosh", "bending modes", "loads")
+JUST_FORWARD = 1e-6  # m
 STATIONS_ALONG = 31  # between the ends of the vehicle
 
 
@@ -47,8 +48,10 @@ class VehicleNumbers:
         Of the modes at the line's points (1, 1/m).
     stations : (s,) array
         m forward of the gimbal plane, load stations among them.
-    loads : tuple of LoadCoefficients
-        At the stations, for each row.
+    loads, shears : tuples of LoadCoefficients
+        Of bending moment and shear force at the stations, for each row.
+    axial : tuple of dict of column to (s,) array, or None
+        Of the axial force; None without an outline.
     """
 
     construction: Construction
@@ -64,6 +67,8 @@ class VehicleNumbers:
     rotation: Array
     stations: Array
     loads: tuple[LoadCoefficients, ...]
+    shears: tuple[LoadCoefficients, ...]
+    axial: tuple[dict[tuple[str, str], Array], ...] | None
 
 
 def compute_vehicle(
@@ -106,28 +111,39 @@ def compute_vehicle(
     displacement, rotation = (line.linear(modes.x, shape) for shape in (modes.displacement, modes.rotation))
     mass = line.spread(modes.x, mass_line(construction, modes.x, flight.liquid))
     rotary = line.spread(modes.x, rotary_line(construction, modes.x))
-    loads = tuple(
-        load_coefficients(
-            LoadedVehicle(
-                line=line,
-                mass=mass[row],
-                rotary_inertia=rotary,
-                normal_force=flight.dynamic_pressure[row] * construction.reference_area * intensity[row],
-                control_thrust=float(flight.control_thrust[row]),
-                relative_velocity=float(flight.relative_velocity[row]),
-                displacement=displacement[row],
-                rotation=rotation[row],
-                slosh_mass=np.array([tank.mass[row] for tank in slosh.values()]),
-                slosh_point=np.array([tank.attach_point[row] for tank in slosh.values()]),
-            ),
-            stations,
+    at_stations = aerodynamics.intensity(construction, flight.mach, stations + JUST_FORWARD)
+    force = flight.dynamic_pressure * construction.reference_area
+    loaded = [
+        LoadedVehicle(
+            line=line,
+            mass=mass[row],
+            rotary_inertia=rotary,
+            normal_force=force[row] * intensity[row],
+            normal_force_at_stations=force[row] * at_stations[row],
+            control_thrust=float(flight.control_thrust[row]),
+            relative_velocity=float(flight.relative_velocity[row]),
+            displacement=displacement[row],
+            rotation=rotation[row],
+            slosh_mass=np.array([tank.mass[row] for tank in slosh.values()]),
+            slosh_point=np.array([tank.attach_point[row] for tank in slosh.values()]),
         )
         for row in range(flight.time.size)
+    ]
+    loads, shears = (
+        tuple(
+            make(v, stations).with_inertia(float(inertia))
+            for v, inertia in zip(loaded, properties.moment_of_inertia, strict=True)
+        )
+        for make in (load_coefficients, shear_coefficients)
     )
+    axial = None
+    if construction.outline is not None:
+        drag = construction.outline.drag_forward(stations + construction.gimbal_station)
+        axial = tuple(axial_coefficients(v, stations, drag) for v in loaded)
     done(STEPS[5])
     return VehicleNumbers(
         construction, flight, properties, slope, center, slosh, modes,
-        line, intensity, displacement, rotation, stations, loads,
+        line, intensity, displacement, rotation, stations, loads, shears, axial,
     )  # fmt: skip
 
 

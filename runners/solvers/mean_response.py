@@ -17,9 +17,10 @@ from ...model.equations.vehicle_tables import MEAN_TABLES
 from ...model.tables import TableGroup
 from .integration import CvodesSettings, Integrator
 from .step_budget import naming_fastest_root
-from .time_nodes import intervals
+from .time_nodes import Interval, intervals
 
 TOLERANCE = 1e-9
+IN_STEP = 1e-6  # of the distance between times
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +49,7 @@ def mean_response(
     ----------
     executable : ExecutableSystem
     times : (k,) array
-        Increasing, the first at the start of the system; between two discontinuities they are equidistant.
+        Increasing, the first at the start of the system; those between two discontinuities are equidistant.
     relative_tolerance : float
 
     Raises
@@ -59,19 +60,22 @@ def mean_response(
     scale = state_scales(system)
     integrator = Integrator(executable.functions.mean, CvodesSettings(relative_tolerance=relative_tolerance))
     states = [np.zeros(len(scale))]
+    last = states[0]
     outputs: list[NDArray] = []
     response = executable.functions.response
     for interval in intervals(executable, float(times[0]), float(times[-1]), pulses=False):
         inside = times[(times > interval.begin) & (times <= interval.end)]
-        parameters = executable.integrator_parameters(
-            interval.begin, interval.end - interval.begin, interval.low, interval.high
-        )
-        where = f"of the mean response from {interval.begin:g} s to {interval.end:g} s"
-        with naming_fastest_root(executable):
-            scaled, _, _ = integrator.run(states[-1] / scale, parameters, where, inside.size)
-        found = scaled * scale[:, None]
+        pieces = []
+        for begin, end, points in _equidistant(interval, inside):
+            parameters = executable.integrator_parameters(begin, end - begin, interval.low, interval.high)
+            where = f"of the mean response from {begin:g} s to {end:g} s"
+            with naming_fastest_root(executable):
+                scaled, _, _ = integrator.run(last / scale, parameters, where, points)
+            pieces.append(scaled * scale[:, None])
+            last = pieces[-1][:, -1]
+        found = np.concatenate(pieces, axis=1)[:, : inside.size]
         at = inside if outputs else np.concatenate([[times[0]], inside])
-        columns = found if outputs else np.concatenate([states[-1][:, None], found], axis=1)
+        columns = found if outputs else np.concatenate([states[0][:, None], found], axis=1)
         mapped = response.map(at.size)
         y = mapped(
             at, np.full(at.size, interval.low), np.full(at.size, interval.high),
@@ -80,6 +84,22 @@ def mean_response(
         outputs.append(y.full().T)
         states.extend(found.T)
     return MeanResponse(times, np.array(states), np.concatenate(outputs))
+
+
+def _equidistant(interval: Interval, inside: NDArray[np.float64]) -> list[tuple[float, float, int]]:
+    """Return begin, end and number of points of what covers an interval: a stop need not be one of the times.
+
+    The first and the last of the times inside bound a piece of their own where they are not in step with the ends.
+    """
+    if not inside.size:
+        return [(interval.begin, interval.end, 1)]
+    first, last, count = float(inside[0]), float(inside[-1]), inside.size
+    step = (interval.end - interval.begin) / count
+    if abs(first - interval.begin - step) <= IN_STEP * step and last == interval.end:
+        return [(interval.begin, interval.end, count)]
+    found = [(interval.begin, first, 1)]
+    found += [(first, last, count - 1)] if count > 1 else []
+    return found + ([(last, interval.end, 1)] if last < interval.end else [])
 
 
 Respond = Callable[[ExecutableSystem, NDArray[np.float64]], MeanResponse]

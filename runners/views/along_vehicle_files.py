@@ -23,7 +23,7 @@ from ..present.files import write_whole
 from ..present.netcdf import write_netcdf
 from ..present.style import COLORS, STYLE, display, words, write_figure
 from ..statistics.larger_side import LABEL, larger_side
-from .moments_along_vehicle import moments_along_vehicle
+from .loads_along_vehicle import loads_along_vehicle
 
 if TYPE_CHECKING:
     from ..study import Study
@@ -65,7 +65,7 @@ def write_along_vehicle(study: Study, times: list[float], time: float | None, fo
         Made and writable.
     """
     vehicle = study.vehicle_for("the bending moment along the vehicle")
-    found = moments_along_vehicle(study, sorted({*times, *([] if time is None else [time])}))
+    found = loads_along_vehicle(study, sorted({*times, *([] if time is None else [time])}))
     if time is None:
         largest = _largest(found).max("station")
         time = float(found["time"].values[int(np.argmax(largest.values))])

@@ -74,7 +74,7 @@ def test_normal_force_slopes_sum_to_the_table(as504):
 def test_every_file_is_found_once():
     files = construction_files(find_vehicle("as504"))
     assert [f.name for f in files[:3]] == ["construction.toml", "masses.csv", "stiffness.csv"]
-    assert len(set(files)) == len(files) == 9
+    assert len(set(files)) == len(files) == 10
     assert all(f.is_file() for f in files)
 
 

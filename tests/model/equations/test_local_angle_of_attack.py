@@ -115,7 +115,7 @@ def test_load_takes_the_local_terms(local):
     ("begin", "end", "key"),
     [
         ("[tables.local_aerodynamics]", "[tables.loads_along", r"tables\.local_aerodynamics"),
-        ("[loads.local]", "# Relative deviations", r"loads\.bending_moment\.local"),
+        ("[loads.local]", "[loads.shear]", r"loads\.bending_moment\.local"),
     ],
 )
 def test_missing_tables_are_named(tmp_path, begin, end, key):

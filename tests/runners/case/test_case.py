@@ -8,8 +8,8 @@ from lag import lag
 
 import ascentwind as aw
 from ascentwind.model.errors import NoVehicleError, UnknownNameError
+from ascentwind.runners.views.loads_along_vehicle import loads_along_vehicle
 from ascentwind.runners.views.mean_comparison import mean_comparison
-from ascentwind.runners.views.moments_along_vehicle import moments_along_vehicle
 
 
 @pytest.mark.parametrize(
@@ -18,7 +18,7 @@ from ascentwind.runners.views.moments_along_vehicle import moments_along_vehicle
         lambda study: study.start_altitude,
         lambda study: study.vehicle_for("a test"),
         lambda study: study.with_wind(None),
-        lambda study: moments_along_vehicle(study, [3.0]),
+        lambda study: loads_along_vehicle(study, [3.0]),
         lambda study: mean_comparison(study),
     ],
 )

@@ -43,23 +43,28 @@ def test_run_writes_tables_and_figures(ascentwind, tmp_path, as504):
     assert "wind" in printed
     with xr.open_dataset(tmp_path / "found" / "statistics.nc", engine="scipy") as stored:
         expected = as504.response_statistics([70.0, 75.0, 80.0])
-        for name, unit in (("bending_moment", "N m"), ("angle_of_attack", "rad"), ("engine_angle", "rad")):
+        for name, unit in (
+            ("bending_moment", "N m"),
+            ("angle_of_attack", "rad"),
+            ("shear_force", "N"),
+            ("q_alpha", "Pa rad"),
+        ):
             np.testing.assert_allclose(
                 stored[f"{name}_variance"], expected.variance.sel(response=name), rtol=1e-12, atol=0.0
             )
             assert stored[f"{name}_std"].attrs["units"] == unit
     rows = list(csv.reader((tmp_path / "found" / "statistics.csv").open()))
     assert tuple(rows[0]) == COLUMNS
-    assert len(rows) == 1 + 3 * 3 * 4
+    assert len(rows) == 1 + 3 * 8 * 4
     row = next(r for r in rows if r[:2] == ["75", "bending_moment"] and r[3] == "wind")
     std = float(expected.std.sel(time=75, response="bending_moment", source="wind"))
     assert float(row[6]) == pytest.approx(std, rel=1e-8)
-    for name in ("bending_moment", "angle_of_attack", "engine_angle", "weighting_functions"):
+    for name in (*expected["response"].values, "weighting_functions"):
         png = (tmp_path / "found" / f"{name}.png").read_bytes()
         assert png.startswith(b"\x89PNG")
         assert "flight time" in (tmp_path / "found" / f"{name}.svg").read_text() or name == "weighting_functions"
     assert sorted(p.suffix for p in (tmp_path / "found").iterdir()) == sorted(
-        [".nc", ".csv", ".json"] + 4 * [".png", ".svg"]
+        [".nc", ".csv", ".json"] + 9 * [".png", ".svg"]
     )
 
 

@@ -20,8 +20,8 @@ from ascentwind.runners.sensitivity.layout import stored_layout
 from ascentwind.runners.statistics.peak_check import check_peaks, with_peak_check
 from ascentwind.runners.statistics.results import ResponseStatistics
 from ascentwind.runners.study import Study
+from ascentwind.runners.views.loads_along_vehicle import loads_along_vehicle
 from ascentwind.runners.views.mean_comparison import mean_comparison
-from ascentwind.runners.views.moments_along_vehicle import moments_along_vehicle
 
 
 @pytest.fixture(scope="module")
@@ -90,7 +90,7 @@ def test_other_files_have_one_unit_a_variable(as504, tmp_path):
     sensitivity = as504.sensitivity("bending_moment", 40.0, quantity="variance")
     files = {
         "sensitivity": stored_layout(sensitivity),
-        "along_vehicle": moments_along_vehicle(as504, [40.0, 45.0]),
+        "along_vehicle": loads_along_vehicle(as504, [40.0, 45.0]),
         "mean": mean_comparison(as504),
     }
     for name, dataset in files.items():
@@ -124,7 +124,7 @@ def test_a_batch_keeps_its_parameter_values(as504, tmp_path):
     assert batch.dataset["control.T1.gain"].values.tolist() == [as504.parameters["control.T1.gain"].value, 0.8]
     assert batch.std.sel(member=1, response="engine_angle")["thrust.sigma"] == 0.02
     frame = batch.to_frame()
-    assert len(frame) == 2 * 3 * 4
+    assert len(frame) == 2 * 8 * 4
     assert set(frame["thrust.sigma"]) == {0.005, 0.02}
     batch.save(tmp_path)
     one_unit_each(plain(tmp_path / "statistics.nc"))
@@ -133,7 +133,7 @@ def test_a_batch_keeps_its_parameter_values(as504, tmp_path):
     for refused in (batch.peaks, lambda: batch.plot("engine_angle")):
         with pytest.raises(ParameterValueError, match="of a batch"):
             refused()
-    assert len(batch.sel(member=1).peaks()) == 3
+    assert len(batch.sel(member=1).peaks()) == 8
 
 
 def test_a_parameter_called_like_a_dimension_stays_apart(cache):

@@ -17,7 +17,7 @@ from ascentwind.runners import Study
 from ascentwind.runners.solvers.time_nodes import interval_before
 from ascentwind.runners.statistics.covariance import CovarianceEquation
 from ascentwind.runners.statistics.sweep import Sweep
-from ascentwind.runners.views.moments_along_vehicle import load_rows, moments_along_vehicle
+from ascentwind.runners.views.loads_along_vehicle import load_rows, loads_along_vehicle
 
 ALONG = "loads_along_vehicle.csv"
 AS504 = built_in_vehicles()["as504"]
@@ -93,7 +93,7 @@ def test_every_station_is_the_moment_that_is_an_output_there(folder, options, no
     changes = {f"options.{name}": True for name in options} | {"options.noise_loads": noise_loads}
     study = Study.load(folder, changes=changes)
     tight = Sweep(relative_tolerance=1e-10)
-    along = moments_along_vehicle(study, TIMES, slosh_reaction="slosh_reaction" in options, engine=tight)
+    along = loads_along_vehicle(study, TIMES, slosh_reaction="slosh_reaction" in options, engine=tight)
     direct = study.response_statistics(TIMES, responses=list(STATIONS), engine=tight)
     for quantity in ("std", "mean_plus_3sigma"):
         expected = direct[quantity].transpose("time", "response", "source").values
@@ -132,15 +132,15 @@ def test_rows_are_those_of_the_moment_that_is_an_output_there(folder, options):
 
 def test_covariance_equation_gives_the_same_without_a_compiler(folder):
     study = Study.load(folder, compile=False)
-    along = moments_along_vehicle(study, TIMES[:1], engine=CovarianceEquation(1e-7))
-    sweep = moments_along_vehicle(Study.load(folder), TIMES[:1])
+    along = loads_along_vehicle(study, TIMES[:1], engine=CovarianceEquation(1e-7))
+    sweep = loads_along_vehicle(Study.load(folder), TIMES[:1])
     np.testing.assert_allclose(along["std"].values, sweep["std"].values, rtol=1e-5)
 
 
 def test_changed_parameters_come_along(folder):
     study = Study.load(folder)
-    doubled = moments_along_vehicle(study.with_parameters({"wind.sigma_scale": 2.0}), TIMES[:1])
-    once = moments_along_vehicle(study, TIMES[:1])
+    doubled = loads_along_vehicle(study.with_parameters({"wind.sigma_scale": 2.0}), TIMES[:1])
+    once = loads_along_vehicle(study, TIMES[:1])
     np.testing.assert_allclose(
         doubled["std"].sel(source="wind").values, 2 * once["std"].sel(source="wind").values, rtol=1e-6
     )
@@ -152,11 +152,11 @@ def test_refusals_say_what_to_do(folder, tmp_path):
     lines = (spoiled / ALONG).read_text().splitlines()
     (spoiled / ALONG).write_text("\n".join(lines[:-1]) + "\n")
     with pytest.raises(DataError, match=r"loads_along_vehicle\.csv: has \d+ rows for \d+ times and 2 stations"):
-        moments_along_vehicle(Study.load(spoiled), TIMES)
+        loads_along_vehicle(Study.load(spoiled), TIMES)
     with pytest.raises(DataError, match=r"tables\.loads_along_vehicle.*build-vehicle"):
-        moments_along_vehicle(Study.load(folder, changes={"tables.loads_along_vehicle": None}), TIMES)
+        loads_along_vehicle(Study.load(folder, changes={"tables.loads_along_vehicle": None}), TIMES)
     with pytest.raises(IntegrationError, match="gives no covariances; use sweep or covariance"):
-        moments_along_vehicle(Study.load(folder), TIMES[:1], engine="cvodes")
+        loads_along_vehicle(Study.load(folder), TIMES[:1], engine="cvodes")
     toml = spoiled / "vehicle.toml"
     toml.write_text(toml.read_text().replace("forward_of_gimbal_m = 57.46\n", ""))
     with pytest.raises(DataError, match=r"bending_moment_b\.forward_of_gimbal_m.*slosh_reaction needs it"):

@@ -1,0 +1,338 @@
+"""Mean and spread of a load along the whole vehicle, from one run.
+
+At a time the load of every station is linear in the same few quantities y: L = K y + c, c the axial force of the mean
+flight. One run gives their means and, source by source, their covariances P; then E[L] = K E[y] + c and
+Var[L] = diag(K P K').
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from ...model.equations.load_components import component_columns, deviation_output
+from ...model.equations.loads import axial_force, axial_noise
+from ...model.equations.noise_loads import noise_load
+from ...model.equations.station_loads import StationLoads, load_station_loads, station_table
+from ...model.errors import DataError, IntegrationError, UnknownNameError
+from ...model.system.names import COMBINED
+from ...model.vehicle.columns import local_load_columns
+from ...model.vehicle.loads import AXIAL_FORCE, BENDING_MOMENT, SHEAR_FORCE, SIDES
+from ...model.vehicle.noise_loads import component_deviations, deviating_tables, loading_deviations
+from ...model.vehicle.vehicle import Vehicle
+from ..case.provenance import provenance
+from ..solvers.time_nodes import interval_before, time_nodes
+from ..statistics.dataset import QUANTITIES
+from ..statistics.engine import Engine
+
+if TYPE_CHECKING:
+    from ..study import Study
+
+Array = NDArray[np.float64]
+
+LOADS = {BENDING_MOMENT: "N m", SHEAR_FORCE: "N", AXIAL_FORCE: "N", **dict.fromkeys(SIDES, "N")}  # and their units
+SAME_STATION = 1e-6  # m
+
+
+@dataclass(frozen=True, eq=False)
+class LoadRows:
+    """A load at stations as rows of the Markov state: load = state x + direct_mean, which no white noise reaches.
+
+    Attributes
+    ----------
+    time : (k,) array
+        s.
+    station, forward_of_gimbal : (s,) arrays
+        Vehicle station and metres forward of the gimbal plane (m).
+    state : (k, s, n) array
+        C, over the states of the study's own system.
+    direct_mean : (k, s) array
+        What does not pass through the states: the mean wind without delay, and the axial force of the mean flight.
+    unit : str
+        Of the load.
+    """
+
+    time: Array
+    station: Array
+    forward_of_gimbal: Array
+    state: Array
+    direct_mean: Array
+    unit: str
+
+
+def load_rows(
+    study: Study,
+    times: Iterable[float],
+    stations: Iterable[float] | None = None,
+    *,
+    load: str = BENDING_MOMENT,
+    slosh_reaction: bool = True,
+) -> LoadRows:
+    """Return a load at stations in terms of the states at each time; from the left where flight jumps.
+
+    Parameters
+    ----------
+    study : Study
+        Of a vehicle with tables of the load along the vehicle.
+    times : iterable of float
+        Increasing, s.
+    stations : iterable of float, optional
+        Vehicle stations (m), each among those of the table; all of them without it.
+    load : str
+        One of ``LOADS``.
+    slosh_reaction : bool
+        As for :func:`loads_along_vehicle`.
+
+    Raises
+    ------
+    DataError, TimeRangeError, DirectNoiseError, UnknownNameError
+    """
+    vehicle = study.vehicle_for(f"the {_words(load)} along the vehicle")
+    at = np.array(study.checked_times(times), float)
+    along = _along(study, vehicle, load, at, slosh_reaction)
+    chosen = np.arange(along.station.size) if stations is None else _chosen(along.station, stations, vehicle, load)
+    names = _components(vehicle)
+    components = _with_components(study, vehicle)
+    components.system.refuse_direct_noise(names)
+    outputs = [components.system.output_index(name) for name in names]
+    executable = components.executable.with_numbers(groups=study.with_means.groups)
+    nodes = time_nodes(executable, at)
+    sides = [interval_before(executable, float(node)) for node in nodes]
+    matrices = [executable.matrices(node, here.low, here.high) for node, here in zip(nodes, sides, strict=True)]
+    state = np.array([m["C"][outputs] for m in matrices])
+    direct = np.array([(m["G"] @ m["inputs"])[outputs, 0] for m in matrices])
+    rows = along.rows[:, chosen]
+    return LoadRows(
+        at,
+        along.station[chosen],
+        along.forward_of_gimbal[chosen],
+        np.einsum("tsc,tcn->tsn", rows, state),
+        np.einsum("tsc,tc->ts", rows, direct) + along.constant[:, chosen],
+        LOADS[load],
+    )
+
+
+def loads_along_vehicle(
+    study: Study,
+    times: Iterable[float],
+    *,
+    load: str = BENDING_MOMENT,
+    slosh_reaction: bool = True,
+    engine: str | Engine | None = None,
+) -> xr.Dataset:
+    """Return mean, variance, std and mean + 3 sigma of a load over (time, station, source).
+
+    Parameters
+    ----------
+    study : Study
+        Of a vehicle with tables of the load along the vehicle.
+    times : iterable of float
+        Flight times, s.
+    load : str
+        One of ``LOADS``; 'bending_moment' without it.
+    slosh_reaction : bool
+        Whether the whole vehicle answers slosh. Without, as the report has it, the moment does not vanish at the tail.
+        Here it does not follow the vehicle's option, which is for its outputs.
+    engine : Sweep, CovarianceEquation or their names, optional
+        Those that give covariances; the sweep where something is compiled.
+
+    Raises
+    ------
+    DataError, TimeRangeError, DirectNoiseError, IntegrationError, UnknownNameError
+    """
+    vehicle = study.vehicle_for(f"the {_words(load)} along the vehicle")
+    for table in _tables(load):
+        station_table(vehicle, table)
+    components = _with_components(study, vehicle)
+    if engine is None:
+        engine = "covariance" if study.executable.shared_library is None else "sweep"
+    found = components.response_statistics(times, responses=_components(vehicle), engine=engine)
+    if "covariance" not in found:
+        raise IntegrationError(f"engine '{found.attrs['engine']}' gives no covariances; use sweep or covariance")
+    at = found["time"].values
+    along = _along(components, vehicle, load, at, slosh_reaction)
+    mean = np.einsum("tnc,tc->tn", along.rows, found.mean.sel(source=COMBINED).values) + along.constant
+    variance = np.einsum("tnc,tscd,tnd->tns", along.rows, found["covariance"].values, along.rows)
+    variance = np.maximum(variance, 0.0)  # rounding, where every coefficient vanishes
+    std = np.sqrt(variance)
+    dims = ("time", "station", "source")
+    dataset = xr.Dataset(
+        {
+            "mean": (dims[:2], mean),
+            "variance": (dims, variance),
+            "std": (dims, std),
+            "mean_plus_3sigma": (dims, mean[:, :, None] + 3 * std),
+        },
+        {
+            "time": ("time", at, {"units": "s", "long_name": "flight time"}),
+            "station": ("station", along.station, {"units": "m", "long_name": "vehicle station"}),
+            "forward_of_gimbal": ("station", along.forward_of_gimbal, {"units": "m"}),
+            "source": found["source"].values,
+        },
+        provenance(study)
+        | {
+            "load": load,
+            "engine": found.attrs["engine"],
+            "slosh_reaction": str(slosh_reaction).lower(),
+            "noise_loads": vehicle.file.options.noise_loads,
+        },
+    )
+    squared = {"N m": "N^2 m^2", "N": "N^2"}[LOADS[load]]
+    for name in dataset:
+        units = squared if name == "variance" else LOADS[load]
+        dataset[name].attrs |= {"units": units, "long_name": QUANTITIES[str(name)]}
+    return dataset
+
+
+@dataclass(frozen=True, eq=False)
+class _Along:
+    """K (times, stations, components) and c (times, stations) of a load at stations (m)."""
+
+    station: Array
+    forward_of_gimbal: Array
+    rows: Array
+    constant: Array
+
+
+def _along(study: Study, vehicle: Vehicle, load: str, times: Array, slosh_reaction: bool) -> _Along:
+    times = np.array([interval_before(study.executable, node).high for node in time_nodes(study.executable, times)])
+    at = [study.tables(float(time)) for time in times]
+    flight = {name: np.array([tables[name] for tables in at])[:, None] for name in at[0]}
+    parts = [load_station_loads(vehicle, table) for table in _tables(load)]
+    first = parts[0]
+    if any(not np.array_equal(part.station, first.station) for part in parts):
+        raise DataError(
+            "holds other stations than the table of the bending moment along the vehicle; build both again",
+            file=vehicle.folder / station_table(vehicle, AXIAL_FORCE).file,
+            column="station",
+        )
+    columns = {table: part.at(times) for table, part in zip(_tables(load), parts, strict=True)}
+    zero = np.zeros((times.size, first.station.size))
+    rows, constant = np.zeros((*zero.shape, len(_components(vehicle)))), zero
+    if AXIAL_FORCE in columns:
+        rows, constant = _axial_rows(vehicle, columns[AXIAL_FORCE], flight, first.forward_of_gimbal)
+    lateral = next((table for table in columns if table != AXIAL_FORCE), None)
+    if lateral is not None:
+        part = parts[_tables(load).index(lateral)]
+        across = _lateral_rows(study, vehicle, lateral, part, columns[lateral], flight, slosh_reaction)
+        if load in SIDES:
+            radius = columns[AXIAL_FORCE]["radius"]  # zero at a tip, where no moment is
+            across *= SIDES[load] * np.divide(2.0, radius, out=zero.copy(), where=radius > 0)[:, :, None]
+        rows = rows + across
+    return _Along(first.station, first.forward_of_gimbal, rows, constant)
+
+
+def _axial_rows(
+    vehicle: Vehicle, columns: dict[str, Array], flight: dict[str, Array], forward: Array
+) -> tuple[Array, Array]:
+    force, tables = axial_force(columns, flight, forward), deviating_tables(vehicle.file)
+    rows = np.zeros((*force.shape, len(_components(vehicle))))
+    for name in component_deviations(vehicle.file):
+        where = _components(vehicle).index(deviation_output(name))
+        rows[:, :, where] = axial_noise(tables.get(name, ()), columns, flight, forward)
+    return rows, force
+
+
+def _lateral_rows(
+    study: Study,
+    vehicle: Vehicle,
+    load: str,
+    part: StationLoads,
+    columns: dict[str, Array],
+    flight: dict[str, Array],
+    slosh_reaction: bool,
+) -> Array:
+    tanks, file = [tank.name for tank in vehicle.slosh], vehicle.file
+    zero = np.zeros_like(columns["angle_of_attack"])
+    forward = {tank: flight[f"slosh.{tank}.attach_point"] > part.forward_of_gimbal for tank in tanks}
+    if load == SHEAR_FORCE:
+        columns |= {f"slosh_{tank}": -flight[f"slosh.{tank}.mass"] * forward[tank] for tank in tanks}
+    columns |= {f"slosh_displacement_{tank}": zero for tank in tanks}
+    if not file.options.local_angle_of_attack:
+        columns |= {column.name: zero for column in local_load_columns(len(vehicle.bending))}
+    if slosh_reaction:
+        weights = {tank: forward[tank] if load == BENDING_MOMENT else zero for tank in tanks}
+        columns |= _with_reaction(columns, weights, flight)
+    if file.options.p_delta:
+        for i in range(1, len(vehicle.bending) + 1):
+            pull = columns[f"p_delta_{i}"] * flight["thrust"] / flight["mass"]
+            columns[f"bending_displacement_{i}"] = columns[f"bending_displacement_{i}"] + pull
+    area, form = study.parameters["reference_area"].value, file.options.noise_loads
+    if load == SHEAR_FORCE and form == "couple_forward":
+        form = "couple_aft"  # a couple makes no shear but by the vehicle's answer to it, wherever it acts
+    means = flight["mean.angle_of_attack"], flight["mean.engine_angle"]
+    deviations = loading_deviations(file)
+    for name in component_deviations(file):
+        value = noise_load(deviations.get(name, ()), form, columns, flight, area, *means)
+        columns[deviation_output(name)] = zero + value
+    return np.stack([columns[c] for c in _columns(vehicle).values()], axis=2)
+
+
+def _with_reaction(columns: dict[str, Array], weights: dict[str, Array], flight: dict[str, Array]) -> dict[str, Array]:
+    """Return the slosh columns with the rigid body's answer, as slosh_reaction of model/equations/loads.py has it."""
+    turning = columns["second_moment"] / flight["moment_of_inertia"]
+    sinking = columns["first_moment"] / flight["mass"]
+    found = {}
+    for tank, weight in weights.items():
+        mass, point = flight[f"slosh.{tank}.mass"], flight[f"slosh.{tank}.attach_point"]
+        inertia = mass * (sinking + (point - flight["center_of_gravity"]) * turning)
+        found[f"slosh_{tank}"] = columns[f"slosh_{tank}"] + inertia
+        found[f"slosh_displacement_{tank}"] = flight["axial_acceleration"] * mass * (weight - turning)
+    return found
+
+
+def _tables(load: str) -> tuple[str, ...]:
+    """Return the loads whose tables make a load.
+
+    Raises
+    ------
+    UnknownNameError
+    """
+    if load not in LOADS:
+        raise UnknownNameError("load along the vehicle", load, list(LOADS))
+    return (BENDING_MOMENT, AXIAL_FORCE) if load in SIDES else (load,)
+
+
+def _columns(vehicle: Vehicle) -> dict[str, str]:
+    tanks = [tank.name for tank in vehicle.slosh]
+    return component_columns(len(vehicle.bending), tanks, component_deviations(vehicle.file))
+
+
+def _components(vehicle: Vehicle) -> list[str]:
+    """Return the outputs that every load along the vehicle is made of."""
+    return list(_columns(vehicle))
+
+
+def _with_components(study: Study, vehicle: Vehicle) -> Study:
+    """Return the study with the quantities that loads are made of as outputs."""
+    wanted = dict.fromkeys((*vehicle.file.options.extra_outputs, "load_components"))
+    options = vehicle.file.options.model_copy(update={"extra_outputs": tuple(wanted)})
+    vehicle = replace(vehicle, file=vehicle.file.model_copy(update={"options": options}))
+    made = type(study).from_vehicle(vehicle, compile=study.executable.shared_library is not None)
+    return made.with_parameters({name: p.value for name, p in study.parameters.items()})
+
+
+def _chosen(found: Array, stations: Iterable[float], vehicle: Vehicle, load: str) -> NDArray[np.intp]:
+    """Return which of the table's stations are wanted."""
+    wanted = np.array(list(stations), float)
+    nearest = np.abs(found - wanted[:, None]).argmin(axis=1)
+    off = ~(np.abs(found[nearest] - wanted) <= SAME_STATION)
+    if off.any():
+        k = int(np.argmax(off))
+        raise DataError(
+            f"has no station at {wanted[k]:g} m; the nearest is {found[nearest[k]]:.9g} m. Choose among its "
+            "stations, or build the vehicle with a load there",
+            file=vehicle.folder / station_table(vehicle, _tables(load)[0]).file,
+            column="station",
+        )
+    return nearest
+
+
+def _words(load: str) -> str:
+    _tables(load)
+    return load.replace("_", " ")
