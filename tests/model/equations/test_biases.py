@@ -79,12 +79,13 @@ def test_simulated_flights_draw_a_bias_each(study):
     swept = study.response_statistics(TIMES)
     flown = study.response_statistics(TIMES, engine=Ensemble(runs=2000, confidence=0.9999))
     low, high = (flown[f"std_{end}"].values for end in ("low", "high"))
-    assert ((low < swept["std"].values) & (swept["std"].values < high)).all()
+    assert ((low <= swept["std"].values) & (swept["std"].values <= high)).all()  # zero where a source does not reach
 
 
 def test_relative_error_of_the_wind_is_that_share_of_the_mean(study):
-    """The mean answers the mean wind from rest, linearly: sigma times |mean|, of every response at every time."""
-    found = study.response_statistics(TIMES)
+    """The mean answers the mean wind from rest, linearly: sigma times |mean|, of every response across the axis."""
+    across = ["bending_moment", "angle_of_attack", "engine_angle", "shear_force", "q_alpha"]
+    found = study.response_statistics(TIMES, responses=across)
     mean = np.abs(found["mean"].sel(source="combined").values)
     np.testing.assert_allclose(found["std"].sel(source="wind_bias").values, 0.1 * mean, rtol=1e-5)
 
