@@ -93,22 +93,32 @@ def parse_window(text: str) -> tuple[float, float]:
     return begin, end
 
 
-def print_loads(loads: list[FlightLoad]) -> None:
-    """Print the levels of flights beside those of their worst instants, and what limits leave."""
+def print_levels(loads: list[FlightLoad]) -> None:
+    """Print the levels of flights beside those of their worst instants."""
     from ..present.style import display, words
 
     begin, end = loads[0].window
-    title = f"Largest values of a flight, {begin:g} to {end:g} s"
-    table = Table("response", "passed with", "level", "95 %", "worst instant", "ratio", title=title)
+    sides = {"both": "size", "upper": "upper side", "lower": "lower side"}[loads[0].sides]
+    title = f"Largest values of a whole flight, {begin:g} to {end:g} s, {sides}"
+    table = Table("response", title=title)
+    for column in ("chance", "level", "± 95 %", "worst instant", "ratio"):
+        table.add_column(column, justify="right", no_wrap=True)
     for load in loads:
         for p, found, instant in zip(load.probabilities, load.levels, load.instant_level.values, strict=True):
             factor, unit = display(load.unit, found.value)
-            low, high = (factor * x for x in found.interval)
+            half = 0.5 * (found.interval[1] - found.interval[0])
             table.add_row(
-                words(load.response), f"{p:g}", f"{factor * found.value:.4g} {unit}", f"{low:.4g} to {high:.4g}",
+                words(load.response), f"{p:g}", f"{factor * found.value:.4g} {unit}", f"{factor * half:.2g}",
                 f"{factor * instant:.4g} {unit}", f"{found.value / instant:.3f}",
             )  # fmt: skip
     console.print(table)
+
+
+def print_loads(loads: list[FlightLoad]) -> None:
+    """Print levels, the shares of the sources, and what limits leave."""
+    from ..present.style import words
+
+    print_levels(loads)
     table = Table("response", title="Shares of the sources where the level is reached")
     for source in loads[0].of.case.system.sources:
         table.add_column(words(source), justify="right")

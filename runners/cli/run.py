@@ -10,10 +10,12 @@ from rich.table import Table
 
 from ...model.errors import AscentwindError, UnusedOptionError
 from ..present.terminal import console, errors
+from .flight_load import print_levels
 from .job import SHOWN, Job, load_study, steps
 from .terminal import Changes, VehicleArgument, number, parse_changes, results_folder
 
 if TYPE_CHECKING:
+    from ..flight_load.load import FlightLoad
     from ..statistics.peak_check import PeakCheck
     from ..statistics.results import ResponseStatistics
     from ..study import Study
@@ -42,6 +44,7 @@ def run(
     """
     from ...model.equations.stated_twice import compare_stated_twice
     from ..case.times import parse_times
+    from ..flight_load.files import with_flight_levels
     from ..present.style import words, write_figure
     from ..statistics.engines import engine_from
     from ..statistics.larger_side import LABEL
@@ -74,6 +77,10 @@ def run(
         statistics = with_peak_check(statistics, check, study)
         statistics.save(job.folder)
         families = sorted({*families, *(p.time for p in check.peaks[:1] if p.time > study.system.start)})
+    loads = _flight_loads(study, end_times)
+    if loads:
+        statistics = with_flight_levels(statistics, loads)
+        statistics.save(job.folder)
     with steps("figures", len(study.system.outputs) + len(families) + 1) as bar:
         for output in study.system.outputs:
             title = f"{flown.title}\n{words(output.name).capitalize()}, mean and {LABEL}"
@@ -93,6 +100,8 @@ def run(
         with console.status("bending moment along the vehicle"):
             job.written += write_along_vehicle(study, end_times, moment_time, job.folder)
     _print_peaks(statistics)
+    if loads:
+        print_levels(loads)
     top = flown.wind.mean.argument[-1]
     if study.tables(end_times[-1])["altitude"] > top:
         console.print(f"Above {top / 1000:g} km the wind tables end and their last values are held.", style="dim")
@@ -116,6 +125,27 @@ def _check_peaks(study: Study, statistics: ResponseStatistics) -> PeakCheck | No
         text = f"The peaks could not be computed a second time, by another road, and stand unchecked: {error}"
         errors.print(text, style="bold red", markup=False, highlight=False, soft_wrap=True)
         return None
+
+
+def _flight_loads(study: Study, end_times: list[float]) -> list[FlightLoad]:
+    """Return the flight's load of every response between the first and the last end time; where it fails say so."""
+    from ..flight_load.request import NoVarianceError
+
+    loads: list[FlightLoad] = []
+    if end_times[-1] <= end_times[0]:
+        return loads
+    with steps("loads of the flight", len(study.system.outputs)) as bar:
+        for output in study.system.outputs:
+            try:
+                loads.append(study.flight_load(output.name, (end_times[0], end_times[-1])))
+                _ = loads[-1].levels
+            except NoVarianceError:
+                pass
+            except AscentwindError as error:
+                text = f"The flight's level of {output.name} could not be computed, all else stands: {error}"
+                errors.print(text, style="bold red", markup=False, highlight=False, soft_wrap=True)
+            bar.done()
+    return loads
 
 
 def _print_peaks(statistics: ResponseStatistics) -> None:

@@ -7,10 +7,12 @@ import io
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
 import xarray as xr
 
 from ..present.files import write_whole
 from ..present.netcdf import RULE, one_unit_a_variable, with_conventions, write_netcdf
+from ..statistics.results import ResponseStatistics
 from .load import FlightLoad
 
 LEVELS = ("flight_level", "flight_level_interval", "instant_level", "exceedance_level", "level_without")
@@ -60,6 +62,28 @@ def flight_dataset(loads: Sequence[FlightLoad]) -> xr.Dataset:
     whole = xr.concat(parts, "response", combine_attrs="drop_conflicts", coords="minimal", compat="override")
     whole = whole.assign_coords(response=[load.response for load in loads])
     return with_conventions(one_unit_a_variable(whole, {"response": [load.unit for load in loads]}))
+
+
+def with_flight_levels(statistics: ResponseStatistics, loads: Sequence[FlightLoad]) -> ResponseStatistics:
+    """Return statistics with the level that flights pass with the first probability, of every response.
+
+    Returns
+    -------
+    ResponseStatistics
+        Over (response) besides: ``flight_level``, ``flight_level_lower`` and ``flight_level_upper``, the ends of the
+        95 % interval of the sampling; NaN for a response without a load.
+    """
+    found = {load.response: (float(load.level[0]), *load.levels[0].interval) for load in loads}
+    names = [str(name) for name in statistics.dataset["response"].values]
+    values = np.array([found.get(name, (np.nan,) * 3) for name in names])
+    what = f"that the largest value of a flight passes with probability {loads[0].probabilities[0]:g}"
+    labels = {"flight_level": f"level {what}", "flight_level_lower": "lower end", "flight_level_upper": "upper end"}
+    variables = {
+        name: ("response", values[:, k], {RULE: "response", "long_name": label})
+        for k, (name, label) in enumerate(labels.items())
+    }
+    window = list(loads[0].window)
+    return ResponseStatistics(statistics.dataset.assign(variables).assign_attrs(flight_level_window_s=window))
 
 
 def _levels_csv(loads: Sequence[FlightLoad]) -> str:

@@ -189,8 +189,8 @@ class FlightLoad:
         """Probability of passing each level from about 0.5 down to 1e-7, (level,), with ``standard_error``."""
         ends = [self._instant_level(np.log(p)) for p in (0.5, 1e-8)]
         values, found, errors = np.linspace(*ends, 36), [], []
-        for number, group in enumerate(np.split(values, 6)):
-            draws = draw_beyond(self.process, self._boundary(group[0]), self._random(2, number), self.draws // 2)
+        for number, group in enumerate(np.split(values, 12)):
+            draws = draw_beyond(self.process, self._boundary(group[0]), self._random(2, number), self.draws // 4)
             for value in group:
                 each = draws.contributions(self._boundary(value))
                 found.append(min(float(each.mean()), 1.0))

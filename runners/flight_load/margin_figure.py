@@ -43,5 +43,5 @@ def margin_figure(load: FlightLoad, title: str) -> Figure:
         axes.set(xlabel="flight time (s)", ylabel=f"{words(load.response)} ({unit})", xlim=load.window)
         axes.set_ylim(min(0.0, axes.get_ylim()[0]), None)
         axes.set_title(wrapped(f"{title}\nlimit passed by {passage.probability.value:.2g} of flights"))
-        axes.legend(loc="best")
+        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=2)
     return figure
