@@ -35,7 +35,7 @@ def run(
     changes: Changes = None,
     along_vehicle: Annotated[
         str | None,
-        typer.Option(help="Bending moment along the vehicle at this time (s, or 'peak'), and its envelope."),
+        typer.Option(help="Loads along the vehicle at this time (s, or 'peak'), and its envelope."),
     ] = None,
 ) -> None:
     """Mean, variance and |mean| + 3 sigma of all responses over flight time: tables and figures.
@@ -97,7 +97,7 @@ def run(
             job.written += write_figure(figure, job.folder, "weighting_functions")
         bar.done()
     if along_vehicle is not None:
-        with console.status("bending moment along the vehicle"):
+        with console.status("loads along the vehicle"):
             job.written += write_along_vehicle(study, end_times, moment_time, job.folder)
     _print_peaks(statistics)
     if loads:

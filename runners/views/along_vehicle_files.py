@@ -1,4 +1,4 @@
-"""The bending moment along the vehicle as files and a figure: at one time, over the flight, and where it is largest."""
+"""The loads along the vehicle as files and figures: at one time, over the flight, and where they are largest."""
 
 from __future__ import annotations
 
@@ -23,12 +23,11 @@ from ..present.files import write_whole
 from ..present.netcdf import write_netcdf
 from ..present.style import COLORS, STYLE, display, words, write_figure
 from ..statistics.larger_side import LABEL, larger_side
-from .loads_along_vehicle import loads_along_vehicle
+from .loads_along_vehicle import LOADS, every_load_along_vehicle, known_loads
 
 if TYPE_CHECKING:
     from ..study import Study
 
-NAME = "bending_moment_along_vehicle"
 PEAK = "peak"
 COLUMNS = ("time_s", "station_m", "source", "mean", "std", "mean_plus_3sigma")
 
@@ -53,32 +52,35 @@ def prepare_along_vehicle(study: Study, text: str) -> float | None:
 
 
 def write_along_vehicle(study: Study, times: list[float], time: float | None, folder: Path) -> list[Path]:
-    """Compute the moment along the vehicle at all times and write NetCDF, CSV and a figure.
+    """Compute the loads along the vehicle at all times, and write NetCDF, CSV and a figure of each.
 
     Parameters
     ----------
     times : list of float
         Of the envelope, s.
     time : float or None
-        Of the section through the vehicle; None takes the time of the largest moment.
+        Of the section through the vehicle; None takes the time of the largest bending moment.
     folder : Path
         Made and writable.
     """
     vehicle = study.vehicle_for("the bending moment along the vehicle")
-    found = loads_along_vehicle(study, sorted({*times, *([] if time is None else [time])}))
+    every = every_load_along_vehicle(study, sorted({*times, *([] if time is None else [time])}), known_loads(vehicle))
     if time is None:
-        largest = _largest(found).max("station")
-        time = float(found["time"].values[int(np.argmax(largest.values))])
-    text = along_csv(found)
-    return [
-        write_netcdf(found, folder / f"{NAME}.nc"),
-        write_whole(folder / f"{NAME}.csv", lambda p: p.write_text(text, encoding="utf-8")),
-        *write_figure(along_figure(found, time, vehicle), folder, NAME),
-    ]
+        largest = _largest(every[0]).max("station")
+        time = float(every[0]["time"].values[int(np.argmax(largest.values))])
+    written = []
+    for found in every:
+        name, text = f"{found.attrs['load']}_along_vehicle", along_csv(found)
+        written += [
+            write_netcdf(found, folder / f"{name}.nc"),
+            write_whole(folder / f"{name}.csv", lambda p, text=text: p.write_text(text, encoding="utf-8")),
+            *write_figure(along_figure(found, time, vehicle), folder, name),
+        ]
+    return written
 
 
 def along_csv(found: xr.Dataset) -> str:
-    """Return the moments as tidy CSV, N m."""
+    """Return a load as tidy CSV, N m or N."""
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
     writer.writerow(COLUMNS)
@@ -93,8 +95,9 @@ def along_csv(found: xr.Dataset) -> str:
 
 
 def along_figure(found: xr.Dataset, time: float, vehicle: Vehicle) -> Figure:
-    """Return the moment over the stations at a time, its envelope over the flight, and both times and stations."""
-    factor, unit = display("N m", _largest(found).values)
+    """Return a load over the stations at a time, its envelope over the flight, and both times and stations."""
+    name = words(found.attrs["load"])
+    factor, unit = display(LOADS[found.attrs["load"]], _largest(found).values)
     panels = 3 if found.sizes["time"] > 1 else 1
     with rc_context(STYLE):
         figure = Figure(figsize=(8.5, 1.2 + 3.5 * panels), layout="constrained")
@@ -115,14 +118,14 @@ def along_figure(found: xr.Dataset, time: float, vehicle: Vehicle) -> Figure:
             axes[2].set_ylabel("flight time (s)")
         for panel in axes[:2]:
             panel.axhline(0, color="black", lw=0.6)
-            panel.set_ylabel(f"bending moment ({unit})")
+            panel.set_ylabel(f"{name} ({unit})")
             panel.margins(x=0, y=0.2)
             for n, load in enumerate(vehicle.file.loads):
                 label = None if n else "load station of the outputs"
                 panel.axvline(load.station_m, color="black", lw=0.8, ls=":", label=label)
             panel.legend(loc="upper center", ncols=4, fontsize=8.5)
         axes[-1].set_xlabel("vehicle station, forward to the right (m)")
-        figure.suptitle(f"{vehicle.title}\nBending moment along the vehicle, with its answer to slosh")
+        figure.suptitle(f"{vehicle.title}\n{name.capitalize()} along the vehicle, with its answer to slosh")
     return figure
 
 

@@ -7,7 +7,7 @@ Var[L] = diag(K P K').
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ...model.equations.load_components import component_columns, deviation_output
 from ...model.equations.loads import axial_force, axial_noise
 from ...model.equations.noise_loads import noise_load
-from ...model.equations.station_loads import StationLoads, load_station_loads, station_table
+from ...model.equations.station_loads import KEYS, StationLoads, load_station_loads, station_table
 from ...model.errors import DataError, IntegrationError, UnknownNameError
 from ...model.system.names import COMBINED
 from ...model.vehicle.columns import local_load_columns
@@ -31,6 +31,7 @@ from ..statistics.dataset import QUANTITIES
 from ..statistics.engine import Engine
 
 if TYPE_CHECKING:
+    from ..statistics.results import ResponseStatistics
     from ..study import Study
 
 Array = NDArray[np.float64]
@@ -145,15 +146,51 @@ def loads_along_vehicle(
     ------
     DataError, TimeRangeError, DirectNoiseError, IntegrationError, UnknownNameError
     """
-    vehicle = study.vehicle_for(f"the {_words(load)} along the vehicle")
-    for table in _tables(load):
-        station_table(vehicle, table)
+    (found,) = every_load_along_vehicle(study, times, [load], slosh_reaction=slosh_reaction, engine=engine)
+    return found
+
+
+def known_loads(vehicle: Vehicle) -> tuple[str, ...]:
+    """Return those of ``LOADS`` whose tables along the vehicle it has."""
+    have = {load for load, key in KEYS.items() if getattr(vehicle.file.tables, key) is not None}
+    return tuple(load for load in LOADS if have.issuperset(_tables(load)))
+
+
+def every_load_along_vehicle(
+    study: Study,
+    times: Iterable[float],
+    loads: Sequence[str],
+    *,
+    slosh_reaction: bool = True,
+    engine: str | Engine | None = None,
+) -> list[xr.Dataset]:
+    """Return :func:`loads_along_vehicle` of several loads, from one run.
+
+    Raises
+    ------
+    DataError, TimeRangeError, DirectNoiseError, IntegrationError, UnknownNameError
+    """
+    vehicle = study.vehicle_for(f"the {' and the '.join(map(_words, loads))} along the vehicle")
+    for load in loads:
+        for table in _tables(load):
+            station_table(vehicle, table)
     components = _with_components(study, vehicle)
     if engine is None:
         engine = "covariance" if study.executable.shared_library is None else "sweep"
     found = components.response_statistics(times, responses=_components(vehicle), engine=engine)
     if "covariance" not in found:
         raise IntegrationError(f"engine '{found.attrs['engine']}' gives no covariances; use sweep or covariance")
+    return [_dataset(study, components, vehicle, load, found, slosh_reaction) for load in loads]
+
+
+def _dataset(
+    study: Study,
+    components: Study,
+    vehicle: Vehicle,
+    load: str,
+    found: ResponseStatistics,
+    slosh_reaction: bool,
+) -> xr.Dataset:
     at = found["time"].values
     along = _along(components, vehicle, load, at, slosh_reaction)
     mean = np.einsum("tnc,tc->tn", along.rows, found.mean.sel(source=COMBINED).values) + along.constant

@@ -12,7 +12,8 @@ import xarray as xr
 from ascentwind.model.vehicle.shipped import built_in_vehicles
 from ascentwind.runners.cli.app import main
 from ascentwind.runners.construct.vehicle_figures import FIGURES
-from ascentwind.runners.views.along_vehicle_files import COLUMNS, NAME
+from ascentwind.runners.views.along_vehicle_files import COLUMNS
+from ascentwind.runners.views.loads_along_vehicle import LOADS
 
 
 @pytest.fixture
@@ -55,13 +56,15 @@ def test_build_vehicle_refuses_with_exit_code_2(ascentwind, tmp_path):
 def test_run_along_vehicle_leaves_files_with_the_peak(ascentwind, tmp_path):
     code, _, _ = ascentwind("run", "as504", "--times", "70:80:5", "--out", "found", "--along-vehicle", "75")
     assert code == 0
-    with xr.open_dataset(tmp_path / "found" / f"{NAME}.nc", engine="scipy") as stored:
+    for load in LOADS:
+        assert (tmp_path / "found" / f"{load}_along_vehicle.png").stat().st_size > 20_000
+    name = "bending_moment_along_vehicle"
+    with xr.open_dataset(tmp_path / "found" / f"{name}.nc", engine="scipy") as stored:
         largest = stored["mean_plus_3sigma"].sel(time=75.0)[:, -1]
         assert 20 < float(stored["station"][int(np.argmax(largest.values))]) < 35
         assert float(np.abs(largest[[0, -1]]).max()) < 1e-4 * float(largest.max())
-        rows = list(csv.reader((tmp_path / "found" / f"{NAME}.csv").open()))
+        rows = list(csv.reader((tmp_path / "found" / f"{name}.csv").open()))
         assert tuple(rows[0]) == COLUMNS and len(rows) == 1 + stored["std"].size
-    assert (tmp_path / "found" / f"{NAME}.png").stat().st_size > 20_000
 
 
 @pytest.mark.parametrize(("time", "message"), [("noon", "'noon' is not a time"), ("500", "beyond the")])
