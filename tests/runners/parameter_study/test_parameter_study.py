@@ -173,8 +173,9 @@ def test_too_few_members_with_numbers(study, tmp_path):
 
 
 def test_aerodynamics_is_one_factor_on_every_normal_force(as504, tmp_path):
-    """The other road: the area of all forces of motion, and the coefficients of the load."""
-    of_load = [f"tables.loads.bending_moment.{name}" for name in ("angle_of_attack", "center_of_pressure")]
+    """The other road: the area of all forces of motion, and the coefficients of the loads."""
+    columns = ("angle_of_attack", "center_of_pressure")
+    of_load = [f"tables.loads.{load}.{name}" for load in ("bending_moment", "shear_force") for name in columns]
     other = {"name": "other", "parameters": ["reference_area", *of_load], "relative": True, "values": [1.0, 1.1]}
     found = []
     for quantity in ({"name": "aerodynamics", "values": [1.0, 1.1]}, other):

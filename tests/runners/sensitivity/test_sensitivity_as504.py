@@ -176,7 +176,8 @@ def test_aerodynamics_is_the_change_of_all_normal_forces_by_one_percent(as504, a
 def test_aerodynamics_is_the_reference_area_with_what_the_loads_hold_of_it(at_75, aerodynamics):
     """Forces of motion hold the area, those of loads their own coefficients: two ways to the same factor."""
     of_loads = [name for name in aerodynamics if name.startswith("loads.")]
-    assert of_loads == ["loads.bending_moment.angle_of_attack", "loads.bending_moment.center_of_pressure"]
+    columns = ("angle_of_attack", "center_of_pressure")
+    assert of_loads == [f"loads.{load}.{name}" for load in ("bending_moment", "shear_force") for name in columns]
     expected = at_75["elasticity"].sel(parameter="reference_area").item()
     expected += at_75["table_elasticity"].sel(table=of_loads).sum().item()
     assert at_75["grouped_factor_elasticity"].item() == pytest.approx(expected, rel=1e-9)
