@@ -17,7 +17,7 @@ FLOORS = (
     ("runners.solvers",),
     ("runners.case", "runners.wind", "runners.construct"),
     ("runners.statistics",),
-    ("runners.sensitivity",),
+    ("runners.sensitivity", "runners.station_loads"),
     ("runners.flight_load",),
     ("runners.study",),
     ("runners.design", "runners.parameter_study", "runners.views"),

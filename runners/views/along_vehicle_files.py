@@ -22,8 +22,8 @@ from ...model.vehicle.vehicle import Vehicle
 from ..present.files import write_whole
 from ..present.netcdf import write_netcdf
 from ..present.style import COLORS, STYLE, display, words, write_figure
+from ..station_loads.loads_along_vehicle import LOADS, every_load_along_vehicle, known_loads
 from ..statistics.larger_side import LABEL, larger_side
-from .loads_along_vehicle import LOADS, every_load_along_vehicle, known_loads
 
 if TYPE_CHECKING:
     from ..study import Study

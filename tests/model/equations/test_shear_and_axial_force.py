@@ -16,7 +16,7 @@ from ascentwind.model.errors import DataError
 from ascentwind.model.vehicle.loads import load_name
 from ascentwind.model.vehicle.shipped import built_in_vehicles
 from ascentwind.runners import CovarianceEquation, Study, Sweep
-from ascentwind.runners.views.loads_along_vehicle import LOADS, load_rows, loads_along_vehicle
+from ascentwind.runners.station_loads.loads_along_vehicle import LOADS, load_rows, loads_along_vehicle
 
 __all__ = ["line", "numbers"]  # fixtures
 AS504 = built_in_vehicles()["as504"]

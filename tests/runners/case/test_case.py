@@ -8,7 +8,7 @@ from lag import lag
 
 import ascentwind as aw
 from ascentwind.model.errors import NoVehicleError, UnknownNameError
-from ascentwind.runners.views.loads_along_vehicle import loads_along_vehicle
+from ascentwind.runners.station_loads.loads_along_vehicle import loads_along_vehicle
 from ascentwind.runners.views.mean_comparison import mean_comparison
 
 

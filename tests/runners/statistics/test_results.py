@@ -17,10 +17,10 @@ from ascentwind.model.errors import (
 )
 from ascentwind.model.wind.range_reference import shipped_statistics
 from ascentwind.runners.sensitivity.layout import stored_layout
+from ascentwind.runners.station_loads.loads_along_vehicle import loads_along_vehicle
 from ascentwind.runners.statistics.peak_check import check_peaks, with_peak_check
 from ascentwind.runners.statistics.results import ResponseStatistics
 from ascentwind.runners.study import Study
-from ascentwind.runners.views.loads_along_vehicle import loads_along_vehicle
 from ascentwind.runners.views.mean_comparison import mean_comparison
 
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
@@ -25,14 +24,13 @@ from ...model.vehicle.columns import local_load_columns
 from ...model.vehicle.loads import AXIAL_FORCE, BENDING_MOMENT, SHEAR_FORCE, SIDES
 from ...model.vehicle.noise_loads import component_deviations, deviating_tables, loading_deviations
 from ...model.vehicle.vehicle import Vehicle
+from ..case.case import Case
 from ..case.provenance import provenance
 from ..solvers.time_nodes import interval_before, time_nodes
 from ..statistics.dataset import QUANTITIES
 from ..statistics.engine import Engine
-
-if TYPE_CHECKING:
-    from ..statistics.results import ResponseStatistics
-    from ..study import Study
+from ..statistics.engines import response_statistics
+from ..statistics.results import ResponseStatistics
 
 Array = NDArray[np.float64]
 
@@ -51,7 +49,7 @@ class LoadRows:
     station, forward_of_gimbal : (s,) arrays
         Vehicle station and metres forward of the gimbal plane (m).
     state : (k, s, n) array
-        C, over the states of the study's own system.
+        C, over the states of the case's own system.
     direct_mean : (k, s) array
         What does not pass through the states: the mean wind without delay, and the axial force of the mean flight.
     unit : str
@@ -67,7 +65,7 @@ class LoadRows:
 
 
 def load_rows(
-    study: Study,
+    case: Case,
     times: Iterable[float],
     stations: Iterable[float] | None = None,
     *,
@@ -78,7 +76,7 @@ def load_rows(
 
     Parameters
     ----------
-    study : Study
+    case : Case
         Of a vehicle with tables of the load along the vehicle.
     times : iterable of float
         Increasing, s.
@@ -93,15 +91,15 @@ def load_rows(
     ------
     DataError, TimeRangeError, DirectNoiseError, UnknownNameError
     """
-    vehicle = study.vehicle_for(f"the {_words(load)} along the vehicle")
-    at = np.array(study.checked_times(times), float)
-    along = _along(study, vehicle, load, at, slosh_reaction)
+    vehicle = case.vehicle_for(f"the {_words(load)} along the vehicle")
+    at = np.array(case.checked_times(times), float)
+    along = _along(case, vehicle, load, at, slosh_reaction)
     chosen = np.arange(along.station.size) if stations is None else _chosen(along.station, stations, vehicle, load)
     names = _components(vehicle)
-    components = _with_components(study, vehicle)
+    components = _with_components(case, vehicle)
     components.system.refuse_direct_noise(names)
     outputs = [components.system.output_index(name) for name in names]
-    executable = components.executable.with_numbers(groups=study.with_means.groups)
+    executable = components.executable.with_numbers(groups=case.with_means.groups)
     nodes = time_nodes(executable, at)
     sides = [interval_before(executable, float(node)) for node in nodes]
     matrices = [executable.matrices(node, here.low, here.high) for node, here in zip(nodes, sides, strict=True)]
@@ -119,7 +117,7 @@ def load_rows(
 
 
 def loads_along_vehicle(
-    study: Study,
+    case: Case,
     times: Iterable[float],
     *,
     load: str = BENDING_MOMENT,
@@ -130,7 +128,7 @@ def loads_along_vehicle(
 
     Parameters
     ----------
-    study : Study
+    case : Case
         Of a vehicle with tables of the load along the vehicle.
     times : iterable of float
         Flight times, s.
@@ -146,7 +144,7 @@ def loads_along_vehicle(
     ------
     DataError, TimeRangeError, DirectNoiseError, IntegrationError, UnknownNameError
     """
-    (found,) = every_load_along_vehicle(study, times, [load], slosh_reaction=slosh_reaction, engine=engine)
+    (found,) = every_load_along_vehicle(case, times, [load], slosh_reaction=slosh_reaction, engine=engine)
     return found
 
 
@@ -157,7 +155,7 @@ def known_loads(vehicle: Vehicle) -> tuple[str, ...]:
 
 
 def every_load_along_vehicle(
-    study: Study,
+    case: Case,
     times: Iterable[float],
     loads: Sequence[str],
     *,
@@ -170,21 +168,21 @@ def every_load_along_vehicle(
     ------
     DataError, TimeRangeError, DirectNoiseError, IntegrationError, UnknownNameError
     """
-    vehicle = study.vehicle_for(f"the {' and the '.join(map(_words, loads))} along the vehicle")
+    vehicle = case.vehicle_for(f"the {' and the '.join(map(_words, loads))} along the vehicle")
     for load in loads:
         for table in _tables(load):
             station_table(vehicle, table)
-    components = _with_components(study, vehicle)
+    components = _with_components(case, vehicle)
     if engine is None:
-        engine = "covariance" if study.executable.shared_library is None else "sweep"
-    found = components.response_statistics(times, responses=_components(vehicle), engine=engine)
+        engine = "covariance" if case.executable.shared_library is None else "sweep"
+    found = response_statistics(components, times, responses=_components(vehicle), engine=engine)
     if "covariance" not in found:
         raise IntegrationError(f"engine '{found.attrs['engine']}' gives no covariances; use sweep or covariance")
-    return [_dataset(study, components, vehicle, load, found, slosh_reaction) for load in loads]
+    return [_dataset(case, components, vehicle, load, found, slosh_reaction) for load in loads]
 
 
 def _dataset(
-    study: Study,
+    case: Case,
     components: Study,
     vehicle: Vehicle,
     load: str,
@@ -211,7 +209,7 @@ def _dataset(
             "forward_of_gimbal": ("station", along.forward_of_gimbal, {"units": "m"}),
             "source": found["source"].values,
         },
-        provenance(study)
+        provenance(case)
         | {
             "load": load,
             "engine": found.attrs["engine"],
@@ -236,9 +234,9 @@ class _Along:
     constant: Array
 
 
-def _along(study: Study, vehicle: Vehicle, load: str, times: Array, slosh_reaction: bool) -> _Along:
-    times = np.array([interval_before(study.executable, node).high for node in time_nodes(study.executable, times)])
-    at = [study.tables(float(time)) for time in times]
+def _along(case: Case, vehicle: Vehicle, load: str, times: Array, slosh_reaction: bool) -> _Along:
+    times = np.array([interval_before(case.executable, node).high for node in time_nodes(case.executable, times)])
+    at = [case.tables(float(time)) for time in times]
     flight = {name: np.array([tables[name] for tables in at])[:, None] for name in at[0]}
     parts = [load_station_loads(vehicle, table) for table in _tables(load)]
     first = parts[0]
@@ -256,7 +254,7 @@ def _along(study: Study, vehicle: Vehicle, load: str, times: Array, slosh_reacti
     lateral = next((table for table in columns if table != AXIAL_FORCE), None)
     if lateral is not None:
         part = parts[_tables(load).index(lateral)]
-        across = _lateral_rows(study, vehicle, lateral, part, columns[lateral], flight, slosh_reaction)
+        across = _lateral_rows(case, vehicle, lateral, part, columns[lateral], flight, slosh_reaction)
         if load in SIDES:
             radius = columns[AXIAL_FORCE]["radius"]  # zero at a tip, where no moment is
             across *= SIDES[load] * np.divide(2.0, radius, out=zero.copy(), where=radius > 0)[:, :, None]
@@ -276,7 +274,7 @@ def _axial_rows(
 
 
 def _lateral_rows(
-    study: Study,
+    case: Case,
     vehicle: Vehicle,
     load: str,
     part: StationLoads,
@@ -299,7 +297,7 @@ def _lateral_rows(
         for i in range(1, len(vehicle.bending) + 1):
             pull = columns[f"p_delta_{i}"] * flight["thrust"] / flight["mass"]
             columns[f"bending_displacement_{i}"] = columns[f"bending_displacement_{i}"] + pull
-    area, form = study.parameters["reference_area"].value, file.options.noise_loads
+    area, form = case.parameters["reference_area"].value, file.options.noise_loads
     if load == SHEAR_FORCE and form == "couple_forward":
         form = "couple_aft"  # a couple makes no shear but by the vehicle's answer to it, wherever it acts
     means = flight["mean.angle_of_attack"], flight["mean.engine_angle"]
@@ -345,13 +343,13 @@ def _components(vehicle: Vehicle) -> list[str]:
     return list(_columns(vehicle))
 
 
-def _with_components(study: Study, vehicle: Vehicle) -> Study:
-    """Return the study with the quantities that loads are made of as outputs."""
+def _with_components(case: Case, vehicle: Vehicle) -> Case:
+    """Return the case with the quantities that loads are made of as outputs."""
     wanted = dict.fromkeys((*vehicle.file.options.extra_outputs, "load_components"))
     options = vehicle.file.options.model_copy(update={"extra_outputs": tuple(wanted)})
     vehicle = replace(vehicle, file=vehicle.file.model_copy(update={"options": options}))
-    made = type(study).from_vehicle(vehicle, compile=study.executable.shared_library is not None)
-    return made.with_parameters({name: p.value for name, p in study.parameters.items()})
+    made = type(case).from_vehicle(vehicle, compile=case.executable.shared_library is not None)
+    return made.with_parameters({name: p.value for name, p in case.parameters.items()})
 
 
 def _chosen(found: Array, stations: Iterable[float], vehicle: Vehicle, load: str) -> NDArray[np.intp]:

@@ -15,9 +15,9 @@ from ascentwind.model.vehicle.columns import REACTION, along_columns, local_colu
 from ascentwind.model.vehicle.shipped import built_in_vehicles
 from ascentwind.runners import Study
 from ascentwind.runners.solvers.time_nodes import interval_before
+from ascentwind.runners.station_loads.loads_along_vehicle import load_rows, loads_along_vehicle
 from ascentwind.runners.statistics.covariance import CovarianceEquation
 from ascentwind.runners.statistics.sweep import Sweep
-from ascentwind.runners.views.loads_along_vehicle import load_rows, loads_along_vehicle
 
 ALONG = "loads_along_vehicle.csv"
 AS504 = built_in_vehicles()["as504"]
