@@ -15,7 +15,9 @@ from ..model.system.names import COMBINED
 from .case.case import Case
 from .case.times import end_times
 from .flight_load.limit_table import Limits
+from .flight_load.limits import limit_passage
 from .flight_load.load import DESIGN, DRAWS, FlightLoad, flight_load
+from .flight_load.passage import Passage
 from .flight_load.request import Sides
 from .sensitivity.check import check_sensitivity
 from .sensitivity.many import sensitivities
@@ -325,6 +327,49 @@ class Study(Case):
         Brownian bridges where white noise reaches the response's rate.
         """
         return flight_load(self, response, window, probabilities, sides, draws, seed, limit)
+
+    def limit_passage(
+        self,
+        limits: str | Path | Limits,
+        window: tuple[float, float] | None = None,
+        probability: float = DESIGN,
+        *,
+        sides: Sides = "both",
+        draws: int = DRAWS,
+        seed: int = 0,
+    ) -> Passage:
+        """Return the chance that a flight passes any of several limits, at any time and any station, jointly.
+
+        Parameters
+        ----------
+        limits : path or Limits
+            Over time: of responses. Over stations, or both: of bending moment, shear force, axial force or equivalent
+            axial load along the vehicle, at each of the vehicle's stations that lies between theirs.
+        window : (float, float), optional
+            As for :meth:`flight_load`, s.
+        probability : float
+            Of which margins are.
+        sides : {'both', 'upper', 'lower'}
+        draws : int
+            Paths of the importance sampling.
+        seed : int
+
+        Returns
+        -------
+        Passage
+            ``probability`` jointly, ``by_load``, ``by_time``, ``level`` and ``margin`` (time, load), ``factor`` on all
+            limits and ``margin_of_safety``.
+
+        Raises
+        ------
+        DataError, UnknownNameError, TimeRangeError, ParameterValueError, DirectNoiseError, NoVarianceError
+
+        Warns
+        -----
+        CertainPassageWarning
+            A limit lies below a mean.
+        """
+        return limit_passage(self, limits, window, probability, sides, draws, seed)
 
     def sensitivity(
         self,

@@ -310,6 +310,27 @@ class Case:
             self._kept[question] = answer()
         return self._kept[question]
 
+    def mean_states(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the states of the linear mean response.
+
+        Parameters
+        ----------
+        times : (k,) array
+            s, increasing.
+
+        Returns
+        -------
+        (k, n) array
+
+        Raises
+        ------
+        IntegrationError
+        """
+        start = self.system.start
+        later = np.asarray(times, float)[np.asarray(times, float) > start]
+        states = self._respond(self.with_means, np.concatenate([[start], later])).states
+        return states if later.size < len(times) else states[1:]
+
     def matrices(self, time: float) -> tuple[NDArray, NDArray, NDArray, NDArray]:
         """Return the matrices at a time; names of their rows and columns are in ``system``.
 

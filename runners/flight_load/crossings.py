@@ -42,6 +42,10 @@ class Boundary:
         """Return the boundary at some of its points."""
         return Boundary(self.upper[points], self.lower[points])
 
+    def of(self, points: slice, outputs: NDArray[np.intp]) -> Boundary:
+        """Return the boundary of some outputs at some points."""
+        return Boundary(self.upper[points][:, outputs], self.lower[points][:, outputs])
+
     def drawn_in(self, by: NDArray[np.float64]) -> Boundary:
         """Return the boundary moved inward by (m, r)."""
         return Boundary(self.upper - by, self.lower + by)

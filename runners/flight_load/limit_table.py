@@ -214,7 +214,7 @@ def limits_over_time(
         limit = Limits.constant(float(limit), response, unit)
     if limit.station is not None:
         raise LimitError(
-            "is over stations of the structure; ask with limit_passage, which takes them jointly", file=limit.file
+            "is over stations of the structure; ask with Study.limit_passage, which takes them jointly", file=limit.file
         )
     limit.of(response, unit, np.array(window))
     return limit

@@ -18,7 +18,7 @@ from ..case.provenance import provenance
 from ..statistics.percentiles import instant_level
 from .crossings import Boundary, sightings
 from .limit_table import LimitError, Limits, limits_over_time
-from .passage import Passage
+from .passage import LimitedLoad, Passage
 from .pathwise import Movement, movement
 from .probability import Estimate, Level, estimate, find_level
 from .process import OneOutput
@@ -181,8 +181,9 @@ class FlightLoad:
         """
         if self.limits is None:
             raise LimitError(f"no limit of '{self.response}' was given; ask with limit=...")
-        limit = self.limits.of(self.response, self.unit, self.process.seen.times)
-        return Passage(self.process, limit, self.unit, None, self.sides, self.probabilities[0], self.draws, self.seed)
+        limit, own = self.limits.of(self.response, self.unit, self.process.seen.times), self.probabilities[0]
+        loads = (LimitedLoad(self.response, self.unit),)
+        return Passage(self.of.case, loads, self.process, limit, self.sides, own, self.draws, self.seed)
 
     @cached_property
     def exceedance(self) -> xr.DataArray:

@@ -1,8 +1,9 @@
-"""Whether a flight keeps its limits: at any time, at any station, jointly."""
+"""Whether a flight keeps its limits: at any time, of any response, at any station, jointly."""
 
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -10,12 +11,38 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from ..case.case import Case
+from ..case.provenance import provenance
 from ..statistics.percentiles import instant_level
 from .crossings import Boundary
 from .probability import Estimate, Level, estimate, find_level
 from .process import Process
 from .request import CertainPassageWarning, Sides
 from .sampling import Draws, draw_beyond
+
+BINS = 60  # of the time of passing
+
+
+@dataclass(frozen=True)
+class LimitedLoad:
+    """What a limit is of.
+
+    Attributes
+    ----------
+    name : str
+        Of the response, or of the load at a station.
+    unit : str
+    station : float
+        m; NaN for a response.
+    """
+
+    name: str
+    unit: str
+    station: float = float("nan")
+
+    def __str__(self) -> str:
+        where = "" if np.isnan(self.station) else f" at station {self.station:g} m"
+        return f"{self.name.replace('_', ' ')}{where}"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -24,39 +51,37 @@ class Passage:
 
     Attributes
     ----------
+    case : Case
+    loads : tuple of LimitedLoad
+        r of them.
     process : Process
-        Of r loads.
+        Of the loads.
     limit : (m, r) array
         Of their sizes, on the grid seen.
-    unit : str
-    station : (r,) array or None
-        m; None where the limit is of one response.
     sides : {'both', 'upper', 'lower'}
     design : float
-        Probability of which margins are.
+        Probability that margins are of.
     draws, seed : int
     """
 
+    case: Case
+    loads: Sequence[LimitedLoad]
     process: Process
     limit: NDArray[np.float64]
-    unit: str
-    station: NDArray[np.float64] | None
     sides: Sides
     design: float
     draws: int
     seed: int
 
     def __post_init__(self):
-        below = np.abs(self.process.seen.mean) >= self.limit
+        mean = self.process.seen.mean
+        toward = {"both": np.abs(mean), "upper": mean, "lower": -mean}[self.sides]
+        below = toward >= self.limit
         if below.any():
-            at = int(np.argmax(below.any(axis=1)))
-            warnings.warn(
-                CertainPassageWarning(
-                    f"the limit lies below the mean from {self.process.seen.times[at]:g} s on: nearly every flight "
-                    "passes it"
-                ),
-                stacklevel=4,
-            )
+            load = int(np.argmax(below.any(axis=0)))
+            time = self.process.seen.times[int(np.argmax(below[:, load]))]
+            text = f"the limit of {self.loads[load]} lies below its mean at {time:g} s: nearly every flight passes it"
+            warnings.warn(CertainPassageWarning(text), stacklevel=4)
 
     @cached_property
     def _boundary(self) -> Boundary:
@@ -68,72 +93,102 @@ class Passage:
 
     @cached_property
     def probability(self) -> Estimate:
-        """Of passing any limit at any time, at any station: jointly, not the sum of single probabilities."""
+        """Of passing any of the limits at any time: jointly; ``sum_of_instants`` is what adding would say."""
         return estimate(self._drawn, self._boundary)
 
     @cached_property
-    def by_station(self) -> xr.DataArray:
-        """Probability of passing the limit of each station at any time, (station,)."""
-        each = self._drawn.near.passed_by_output(self._boundary)
-        return self._over_stations(np.minimum((self._drawn.weight[:, None] * each).mean(axis=0), 1.0), "probability")
+    def by_load(self) -> xr.DataArray:
+        """Probability of passing the limit of each load at any time, (load,)."""
+        what = {"units": "1", "long_name": "probability of passing the limit at any time"}
+        return xr.DataArray(
+            np.minimum(self._drawn.by_output(self._boundary), 1.0), self._loads(), ("load",), "probability", what
+        )
 
     @cached_property
     def by_time(self) -> xr.DataArray:
-        """How the probability falls on the times at which flights are farthest beyond, s^-1, (time,)."""
+        """Density of passing over the times at which flights are farthest beyond, s^-1, (time,)."""
         places = self._drawn.places(self._boundary).sum(axis=(1, 2))
         times = self.process.seen.times
-        edges = np.linspace(times[0], times[-1], 61)
+        edges = np.linspace(times[0], times[-1], BINS + 1)
         density = np.histogram(times, edges, weights=places)[0] / np.diff(edges)
-        time = ("time", 0.5 * (edges[1:] + edges[:-1]), {"units": "s", "long_name": "flight time"})
+        time = ("passage_time", 0.5 * (edges[1:] + edges[:-1]), {"units": "s", "long_name": "flight time"})
         what = {"units": "s^-1", "long_name": "probability density of passing, by the time farthest beyond"}
-        return xr.DataArray(density, {"time": time}, ("time",), "passage_time", what)
+        return xr.DataArray(density, {"passage_time": time}, ("passage_time",), "passage_density", what)
+
+    @cached_property
+    def level(self) -> xr.DataArray:
+        """The level that each load passes at each instant with the design probability, (time, load), SI."""
+        values = instant_level(self.process.drawn.mean, self.process.std, self.design, self.sides)
+        return self._over_time(values, "level", f"passed at the instant with probability {self.design:g}")
 
     @cached_property
     def margin(self) -> xr.DataArray:
-        """Limit minus the level that the load passes at that instant with the design probability, (time, station)."""
-        drawn = self.process.drawn
-        limit = self.limit[:: self.process.stride]
-        margin = limit - instant_level(drawn.mean, self.process.std, self.design, self.sides)
-        time = ("time", drawn.times, {"units": "s", "long_name": "flight time"})
-        what = {"units": self.unit, "long_name": f"margin to the limit at an instant, with probability {self.design:g}"}
-        if self.station is None:
-            return xr.DataArray(margin[:, 0], {"time": time}, ("time",), "margin", what)
-        station = ("station", self.station, {"units": "m", "long_name": "vehicle station"})
-        return xr.DataArray(margin, {"time": time, "station": station}, ("time", "station"), "margin", what)
+        """Limit minus that level, (time, load), SI."""
+        values = self.limit[:: self.process.stride] - self.level.values
+        return self._over_time(values, "margin", f"limit minus the level passed with probability {self.design:g}")
 
     @cached_property
     def factor(self) -> Level:
-        """The factor on all limits at which the flight passes one of them with the design probability."""
+        """The factor on all limits at which a flight passes one of them with the design probability."""
 
         def scaled(by: float) -> Boundary:
             return Boundary.around(by * self.limit, self.sides)
 
-        return find_level(
-            self.process, self.design, scaled, self._typical_factor, np.random.default_rng([self.seed, 11]), self.draws
-        )
-
-    @property
-    def _typical_factor(self) -> float:
         limit = self.limit[:: self.process.stride]
-        return float(((np.abs(self.process.drawn.mean) + 3 * self.process.std) / limit).max())
+        size = float(((np.abs(self.process.drawn.mean) + 3 * self.process.std) / limit).max())
+        random = np.random.default_rng([self.seed, 11])
+        return find_level(self.process, self.design, scaled, size, random, self.draws)
 
     @property
     def margin_of_safety(self) -> float:
-        """Limit over the flight's level, minus one: how much of the limits is left at the design probability."""
+        """What is left of the limits at the design probability of the whole flight: one over the factor, minus one."""
         return 1.0 / self.factor.value - 1.0
 
-    def _over_stations(self, values: NDArray[np.float64], name: str) -> xr.DataArray:
-        what = {"units": "1", "long_name": "probability of passing the limit at any time"}
-        if self.station is None:
-            return xr.DataArray(values[0], name=name, attrs=what)
-        station = ("station", self.station, {"units": "m", "long_name": "vehicle station"})
-        return xr.DataArray(values, {"station": station}, ("station",), name, what)
-
     def to_dataset(self) -> xr.Dataset:
-        """Return probability, margins and shares in one dataset."""
-        p, names = self.probability, ("value", "standard_error", "spacing_error", "largest_instant", "sum_of_instants")
-        attributes = {f"passage_{name}": getattr(p, name) for name in names}
-        attributes |= {"design_probability": self.design, "margin_of_safety": self.margin_of_safety}
-        parts = {"passage_by_station": self.by_station, "passage_time": self.by_time}
-        found = xr.Dataset({"margin": self.margin} | parts if self.station is not None else {"margin": self.margin})
-        return found.assign_attrs(attributes)
+        """Return limits, levels, margins and probabilities.
+
+        Returns
+        -------
+        xarray.Dataset
+            Over (time, load), with name, unit and station of each load as coordinates. Attributes: ``probability`` of
+            passing any, its ``standard_error`` and ``spacing_error``, the bounds, ``margin_of_safety``.
+        """
+        p = self.probability
+        limit = self._over_time(self.limit[:: self.process.stride], "limit", "limit of the size")
+        parts = {"limit": limit, "level": self.level, "margin": self.margin}
+        found = xr.Dataset(parts | {"passage_probability": self.by_load, "passage_density": self.by_time})
+        return found.assign_attrs(
+            provenance(self.case)
+            | {
+                "probability": p.value,
+                "standard_error": p.standard_error,
+                "spacing_error": p.spacing_error,
+                "largest_instant": p.largest_instant,
+                "sum_of_instants": p.sum_of_instants,
+                "design_probability": self.design,
+                "margin_of_safety": self.margin_of_safety,
+                "sides": self.sides,
+                "draws": self.draws,
+                "seed": self.seed,
+            }
+        )
+
+    def __repr__(self) -> str:
+        p = self.probability
+        names = f"{len(self.loads)} limits" if len(self.loads) > 1 else f"limit of {self.loads[0]}"
+        low, high = p.interval
+        return (
+            f"Passage of {names}: {p.value:.4g} of flights ({low:.3g} to {high:.3g})\n"
+            f"  margin of safety at {self.design:g}: {self.margin_of_safety:+.4f}"
+        )
+
+    def _loads(self) -> dict[str, tuple]:
+        return {
+            "load_name": ("load", [load.name for load in self.loads]),
+            "load_unit": ("load", [load.unit for load in self.loads]),
+            "station": ("load", [load.station for load in self.loads], {"units": "m", "long_name": "vehicle station"}),
+        }
+
+    def _over_time(self, values: NDArray[np.float64], name: str, meaning: str) -> xr.DataArray:
+        time = ("time", self.process.drawn.times, {"units": "s", "long_name": "flight time"})
+        return xr.DataArray(values, {"time": time} | self._loads(), ("time", "load"), name, {"long_name": meaning})

@@ -107,6 +107,10 @@ class Process(Protocol):
         """Return covariances of everything with chosen outputs at chosen points, (len(points), m, r)."""
         ...
 
+    def restricted(self, points: slice, outputs: NDArray[np.intp]) -> Process | None:
+        """Return the process at some consecutive points drawn and of some outputs; None where that saves nothing."""
+        ...
+
     def steps_near(
         self, deviations: NDArray[np.float64], near: NDArray[np.bool_], random: np.random.Generator
     ) -> tuple[Steps, Steps]:
@@ -229,6 +233,9 @@ class OneOutput:
 
     def covariances(self, points: NDArray[np.intp], outputs: NDArray[np.intp]) -> NDArray[np.float64]:
         return self.covariance[points][:, :, None]
+
+    def restricted(self, points: slice, outputs: NDArray[np.intp]) -> Process | None:
+        return None
 
     def steps_near(
         self, deviations: NDArray[np.float64], near: NDArray[np.bool_], random: np.random.Generator
@@ -387,6 +394,9 @@ class ManyOutputs:
     def between(self) -> NDArray[np.float64]:
         step = np.sqrt(np.max(np.diff(self.chain.times)))
         return SEVERAL / 2 * np.abs(self.drawn.diffusion) * step
+
+    def restricted(self, points: slice, outputs: NDArray[np.intp]) -> Process | None:
+        return ManyOutputs(self.chain.part(points), self.row[points][:, outputs], self.mean[points][:, outputs])
 
     @cached_property
     def _scale(self) -> NDArray[np.float64]:

@@ -11,7 +11,7 @@ counts with the probability that it passes the true one (:mod:`crossings`).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,7 @@ from scipy.special import log_ndtr, logsumexp, ndtri_exp
 from .crossings import Boundary, Sightings, sightings
 from .process import Process
 
+LEFT_OUT = 2e-3  # of the probability, at most, that is passed only where no path is drawn
 MEMORY = 2e7  # numbers in an array of paths at a time
 
 
@@ -36,6 +37,10 @@ class Draws:
         On the grid seen, and on every second point of it.
     deviations : (count, m, r) array or None
         Of the paths from the mean on the grid drawn, where they are kept.
+    first, last : int
+        Points between which paths were drawn,
+    outputs : (k,) array of int or None
+        and of which outputs: all else is passed so rarely that it is left out.
     """
 
     process: Process
@@ -43,17 +48,23 @@ class Draws:
     near: Sightings
     coarser: Sightings
     deviations: NDArray[np.float64] | None = None
+    first: int = 0
+    last: int | None = None
+    outputs: NDArray[np.intp] | None = None
+
+    def _seen(self, boundary: Boundary) -> Boundary:
+        return boundary if self.outputs is None else boundary.of(slice(self.first, self.last), self.outputs)
 
     def contributions(self, boundary: Boundary) -> NDArray[np.float64]:
         """Return what each draw adds to the probability of passing a boundary, whose mean is the estimate, (count,).
 
         The boundary lies nowhere inside the one drawn for.
         """
-        return self.weight * self.near.passed(boundary)
+        return self.weight * self.near.passed(self._seen(boundary))
 
     def coarser_contributions(self, boundary: Boundary) -> NDArray[np.float64]:
         """Return the same by looking at every second point only."""
-        return self.weight * self.coarser.passed(boundary.at(slice(None, None, 2)))
+        return self.weight * self.coarser.passed(self._seen(boundary).at(slice(None, None, 2)))
 
     def places(self, boundary: Boundary) -> NDArray[np.float64]:
         """Return how the probability of passing falls on points, outputs and sides, each path where it is worst.
@@ -63,9 +74,20 @@ class Draws:
         (m, r, 2) array
         """
         found = np.zeros((*boundary.upper.shape, 2))
-        path, *place = self.near.worst(boundary)
-        np.add.at(found, tuple(place), self.contributions(boundary)[path])
+        path, point, output, side = self.near.worst(self._seen(boundary))
+        if self.outputs is not None:
+            point, output = point + self.first, self.outputs[output]
+        np.add.at(found, (point, output, side), self.contributions(boundary)[path])
         return found / self.weight.size
+
+    def by_output(self, boundary: Boundary) -> NDArray[np.float64]:
+        """Return the probability that each output passes a boundary, (r,); zero where paths were left out."""
+        each = (self.weight[:, None] * self.near.passed_by_output(self._seen(boundary))).mean(axis=0)
+        if self.outputs is None:
+            return each
+        found = np.zeros(boundary.upper.shape[1])
+        found[self.outputs] = each
+        return found
 
 
 def instant_probabilities(process: Process, boundary: Boundary) -> NDArray[np.float64]:
@@ -93,6 +115,15 @@ def draw_beyond(
     keep : bool
         Whether the deviations are kept, for few outputs.
     """
+    points, outputs = _worth_drawing(process, boundary)
+    smaller = None if outputs is None else process.restricted(points, outputs)
+    if smaller is not None and outputs is not None:
+        drawn = _drawn(smaller, boundary.of(points, outputs), random, count, keep)
+        return replace(drawn, process=process, first=points.start, last=points.stop, outputs=outputs)
+    return _drawn(process, boundary, random, count, keep)
+
+
+def _drawn(process: Process, boundary: Boundary, random: np.random.Generator, count: int, keep: bool) -> Draws:
     largest = max(16, int(MEMORY / process.drawn.mean.size))
     weights, near, coarser, kept = [], [], [], []
     while count > 0:
@@ -107,6 +138,23 @@ def draw_beyond(
         count -= part
     sighted = Sightings.joined(near), Sightings.joined(coarser)
     return Draws(process, np.concatenate(weights), *sighted, np.concatenate(kept) if keep else None)
+
+
+def _worth_drawing(process: Process, boundary: Boundary) -> tuple[slice, NDArray[np.intp] | None]:
+    """Return points and outputs outside which passing is so rare that its sum does not matter; None for all of them."""
+    if process.drawn.mean.shape[1] == 1:
+        return slice(None), None
+    inner = boundary.at(slice(None, None, process.stride)).drawn_in(process.between)
+    chance = np.exp(instant_probabilities(process, inner)).sum(axis=0)
+    spare = 0.5 * LEFT_OUT * float(np.exp(instant_probabilities(process, boundary)).max())
+    by_point, by_output = chance.sum(axis=1), chance.sum(axis=0)
+    first = int(np.searchsorted(np.cumsum(by_point), 0.5 * spare))
+    last = by_point.size - int(np.searchsorted(np.cumsum(by_point[::-1]), 0.5 * spare))
+    order = np.argsort(by_output)
+    outputs = np.sort(order[int(np.searchsorted(np.cumsum(by_output[order]), spare)) :])
+    if last - first < 3 or not outputs.size or (last - first, outputs.size) == chance.shape:
+        return slice(None), None
+    return slice(first, last), outputs
 
 
 def _paths_beyond(

@@ -64,6 +64,21 @@ class MarkovChain:
             P.append(Phi @ P[-1] @ Phi.T + Q)
         return np.array(P)
 
+    def part(self, points: slice) -> MarkovChain:
+        """Return the chain over consecutive times."""
+        first, last, _ = points.indices(self.times.size)
+        steps = slice(first, last - 1)
+        return MarkovChain(
+            self.times[points],
+            self.transition[steps],
+            self.added[steps],
+            self.covariance[first],
+            self.state_matrix[points],
+            self.noise_matrix[points],
+            self.output[points],
+            self.mean[points],
+        )
+
 
 def chain_by_sweep(
     engine: CompiledSweep, executable: ExecutableSystem, times: NDArray[np.float64], relative_tolerance: float

@@ -1,0 +1,91 @@
+"""Limits of several responses and of the structure at its stations, against whole flights, jointly."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...model.errors import UnknownNameError
+from ..case.case import Case
+from ..solvers.markov_chain import MarkovChain
+from ..station_loads.loads_along_vehicle import LOADS, SAME_STATION, load_rows
+from .limit_table import LimitError, Limits
+from .passage import LimitedLoad, Passage
+from .process import ManyOutputs
+from .request import Sides, checked_draws, checked_probabilities, checked_sides, refuse_without_variance
+from .window import checked_window, window_chain
+
+STEPS = 2400  # of the window; AS-504 in 60 s: 0.025 s
+
+Rows = tuple[list[LimitedLoad], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
+
+
+def limit_passage(
+    case: Case,
+    limits: str | Path | Limits,
+    window: tuple[float, float] | None,
+    probability: float,
+    sides: Sides,
+    draws: int,
+    seed: int,
+) -> Passage:
+    """See :meth:`Study.limit_passage`."""
+    checked_draws(draws, seed)
+    (design,) = checked_probabilities(probability)
+    chosen, flown = checked_sides(sides), checked_window(case, window)
+    table = limits if isinstance(limits, Limits) else Limits.read(limits)
+    _refuse_unknown(case, table)
+    for name, unit in table.units.items():
+        table.of(name, _unit(case, table, name) or unit, np.array(flown))
+    chain = window_chain(case, flown, STEPS)
+    parts = [_station_rows(case, table, chain, n) if table.station is not None else _output_row(case, table, chain, n)
+             for n in table.values]  # fmt: skip
+    loads = [load for part in parts for load in part[0]]
+    row, mean, limit = (np.concatenate([part[k] for part in parts], axis=1) for k in (1, 2, 3))
+    process = ManyOutputs(chain, row, mean)
+    varies = process.std.max(axis=0) > 0
+    if not varies.any():
+        refuse_without_variance(" and ".join(table.values), process)
+    return Passage(case, loads, process, limit, chosen, design, draws, seed)
+
+
+def _refuse_unknown(case: Case, table: Limits) -> None:
+    known = list(case.system.output_names) if table.station is None else list(LOADS)
+    for name in table.values:
+        if name not in known:
+            raise UnknownNameError("load at a station" if table.station is not None else "response", name, known)
+    if table.station is None:
+        case.checked_responses(table.values)
+
+
+def _unit(case: Case, table: Limits, name: str) -> str:
+    return LOADS[name] if table.station is not None else case.system.outputs[case.system.output_index(name)].unit
+
+
+def _output_row(case: Case, table: Limits, chain: MarkovChain, name: str) -> Rows:
+    """Return a response: what it is, its row (m, 1, n), its mean and its limit (m, 1)."""
+    which, unit = case.system.output_index(name), _unit(case, table, name)
+    limit = table.of(name, unit, chain.times)
+    return [LimitedLoad(name, unit)], chain.output[:, [which]], chain.mean[:, [which]], limit
+
+
+def _station_rows(case: Case, table: Limits, chain: MarkovChain, name: str) -> Rows:
+    """Return a load at the vehicle's stations within those of the table: rows (m, s, n), means and limits (m, s)."""
+    found = load_rows(case, chain.times.tolist(), load=name)
+    limit, stations = table.of(name, LOADS[name], chain.times), table.station
+    assert stations is not None
+    inside = (found.station >= stations[0] - SAME_STATION) & (found.station <= stations[-1] + SAME_STATION)
+    if not inside.any():
+        raise LimitError(
+            f"ends at stations {stations[0]:g} and {stations[-1]:g} m, between which the vehicle has no station; its "
+            f"stations go from {found.station[0]:g} to {found.station[-1]:g} m",
+            file=table.file,
+            column="station",
+        )
+    at = np.flatnonzero(inside)
+    mean = np.einsum("msn,mn->ms", found.state[:, at], case.mean_states(chain.times)) + found.direct_mean[:, at]
+    own = np.stack([np.interp(found.station[at], stations, row) for row in limit])
+    loads = [LimitedLoad(name, LOADS[name], float(s)) for s in found.station[at]]
+    return loads, found.state[:, at], mean, own
