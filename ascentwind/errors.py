@@ -41,7 +41,12 @@ __getattr__, __dir__, __all__ = _lazy.attach(
         "runners.design.design": ["InfeasibleDesignError"],
         "runners.design.problem": ["DesignProblemError"],
         "runners.flight_load.limit_table": ["LimitError"],
-        "runners.flight_load.request": ["CertainPassageWarning", "NoVarianceError", "SpacingWarning"],
+        "runners.flight_load.request": [
+            "CertainPassageWarning",
+            "NoVarianceError",
+            "SpacingWarning",
+            "UncheckedStationsWarning",
+        ],
         "runners.parameter_study.cluster": ["SchedulerError"],
         "runners.parameter_study.sampling": ["UnbalancedSampleWarning"],
         "runners.parameter_study.store": ["ResumeError"],

@@ -14,8 +14,11 @@ from ..present.terminal import console
 from .job import Job, load_study, steps
 from .terminal import Changes, VehicleArgument, number, results_folder, whole
 
+SHOWN_LIMITS = 8
+
 if TYPE_CHECKING:
     from ..flight_load.load import FlightLoad
+    from ..flight_load.passage import Passage
 
 
 def flight_load(
@@ -39,8 +42,9 @@ def flight_load(
     changes: Changes = None,
 ) -> None:
     """The load of the whole flight: levels that its largest values pass, exceedance, limits and margins."""
+    from ..flight_load.capability_figure import capability_figure
     from ..flight_load.exceedance_figure import exceedance_figure
-    from ..flight_load.files import write_flight_loads
+    from ..flight_load.files import write_flight_loads, write_passage
     from ..flight_load.limit_table import Limits
     from ..flight_load.load import DESIGN
     from ..flight_load.margin_figure import margin_figure
@@ -65,8 +69,18 @@ def flight_load(
             _ = load.exceedance, load.time_of_maximum, load.shares
             loads.append(load)
             bar.done(words(name))
+    passage = None
+    if limits is not None and (over_time is None or len(over_time.values) > 1):
+        with console.status("limits together"):
+            passage = study.limit_passage(limits, flown, asked[0], sides=chosen, draws=2 * draws, seed=seed)
+            _ = passage.probability, passage.factor
     job.replace_earlier("flight-load", study.system.name)
     job.written += write_flight_loads(loads, job.folder)
+    if passage is not None:
+        job.written += write_passage(passage, job.folder)
+        if over_time is None:
+            heading = f"{title}\nLimits along the vehicle, {passage.design:g} of flights"
+            job.written += write_figure(capability_figure(passage, heading), job.folder, "limits_along_vehicle")
     with steps("figures", len(loads)) as bar:
         for load in loads:
             heading = f"{title}\nLargest {words(load.response)} of the flight"
@@ -76,6 +90,8 @@ def flight_load(
                 job.written += write_figure(margin_figure(load, heading), job.folder, f"limit_{load.response}")
             bar.done()
     print_loads(loads)
+    if passage is not None:
+        print_passage(passage)
     job.end()
 
 
@@ -136,3 +152,27 @@ def print_loads(loads: list[FlightLoad]) -> None:
                 f"margin of safety is {passage.margin_of_safety:+.3f}.",
                 highlight=False, soft_wrap=True,
             )  # fmt: skip
+
+
+def print_passage(passage: Passage) -> None:
+    """Print the chance to pass any of several limits, and where it comes from."""
+    p, chance = passage.probability, passage.by_load.values
+    table = Table("limit of", title="Limits passed most often")
+    for column in ("chance", "least margin", "at"):
+        table.add_column(column, justify="right", no_wrap=True)
+    from ..present.style import display
+
+    margin, times = passage.margin.values, passage.margin["time"].values
+    for r in sorted(range(chance.size), key=lambda r: -chance[r])[:SHOWN_LIMITS]:
+        load, at = passage.loads[r], int(margin[:, r].argmin())
+        factor, unit = display(load.unit, passage.limit[:, r])
+        left = f"{factor * margin[at, r]:.3g} {unit}"
+        table.add_row(str(load), f"{chance[r]:.3g}", left, f"{times[at]:.4g} s")
+    console.print(table)
+    console.print(
+        f"Any of {len(passage.loads)} limits is passed by {p.value:.3g} of flights (95 %: {p.interval[0]:.2g} to "
+        f"{p.interval[1]:.2g}), jointly; the worst single instant would say {p.largest_instant:.2g}, adding them all "
+        f"{p.sum_of_instants:.2g}. At {passage.design:g} the margin of safety is {passage.margin_of_safety:+.3f}.",
+        highlight=False,
+        soft_wrap=True,
+    )

@@ -14,7 +14,9 @@ from ..present.files import write_whole
 from ..present.netcdf import RULE, one_unit_a_variable, with_conventions, write_netcdf
 from ..statistics.results import ResponseStatistics
 from .load import FlightLoad
+from .passage import Passage
 
+CSV_EVERY = 20  # points of the grid of times in limits.csv
 LEVELS = ("flight_level", "flight_level_interval", "instant_level", "exceedance_level", "level_without")
 
 
@@ -84,6 +86,37 @@ def with_flight_levels(statistics: ResponseStatistics, loads: Sequence[FlightLoa
     }
     window = list(loads[0].window)
     return ResponseStatistics(statistics.dataset.assign(variables).assign_attrs(flight_level_window_s=window))
+
+
+def write_passage(passage: Passage, folder: Path) -> list[Path]:
+    """Write limits.nc, of which each load's variables have their own unit, and limits.csv, a row a load and time.
+
+    Returns
+    -------
+    list of Path
+
+    Raises
+    ------
+    OutputFolderError
+    """
+    found = passage.to_dataset()
+    for name in ("limit", "level", "margin"):
+        found[name].attrs[RULE] = "load"
+    labels = [load.label for load in passage.loads]
+    whole = found.drop_vars("load_unit").assign_coords(load=labels)
+    whole = with_conventions(one_unit_a_variable(whole, {"load": [load.unit for load in passage.loads]}, words={}))
+    rows: list[Sequence[object]] = [("load", "unit", "station_m", "time_s", "limit", "level", "margin")]
+    values = [found[name].values for name in ("limit", "level", "margin")]
+    for r, load in enumerate(passage.loads):
+        station = "" if np.isnan(load.station) else f"{load.station:.9g}"
+        for k, time in enumerate(found["time"].values[::CSV_EVERY]):
+            numbers = (f"{part[k * CSV_EVERY, r]:.9e}" for part in values)
+            rows.append((load.name, load.unit, station, f"{time:.12g}", *numbers))
+    text = _csv(rows)
+    return [
+        write_netcdf(whole, folder / "limits.nc"),
+        write_whole(folder / "limits.csv", lambda p: p.write_text(text, encoding="utf-8")),
+    ]
 
 
 def _levels_csv(loads: Sequence[FlightLoad]) -> str:

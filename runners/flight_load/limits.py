@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,14 @@ from ..station_loads.loads_along_vehicle import LOADS, SAME_STATION, load_rows
 from .limit_table import LimitError, Limits
 from .passage import LimitedLoad, Passage
 from .process import ManyOutputs
-from .request import Sides, checked_draws, checked_probabilities, checked_sides, refuse_without_variance
+from .request import (
+    Sides,
+    UncheckedStationsWarning,
+    checked_draws,
+    checked_probabilities,
+    checked_sides,
+    refuse_without_variance,
+)
 from .window import checked_window, window_chain
 
 STEPS = 2400  # of the window; AS-504 in 60 s: 0.025 s
@@ -84,6 +92,12 @@ def _station_rows(case: Case, table: Limits, chain: MarkovChain, name: str) -> R
             file=table.file,
             column="station",
         )
+    if not inside.all():
+        text = (
+            f"the limit of {name.replace('_', ' ')} is given from station {stations[0]:g} to {stations[-1]:g} m: "
+            f"{int((~inside).sum())} of the vehicle's {inside.size} stations lie outside and are not looked at"
+        )
+        warnings.warn(UncheckedStationsWarning(text), stacklevel=4)
     at = np.flatnonzero(inside)
     mean = np.einsum("msn,mn->ms", found.state[:, at], case.mean_states(chain.times)) + found.direct_mean[:, at]
     own = np.stack([np.interp(found.station[at], stations, row) for row in limit])

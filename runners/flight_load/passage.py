@@ -40,6 +40,11 @@ class LimitedLoad:
     unit: str
     station: float = float("nan")
 
+    @property
+    def label(self) -> str:
+        """A name of its own, such as 'bending_moment_at_25m'."""
+        return self.name if np.isnan(self.station) else f"{self.name}_at_{self.station:.6g}m"
+
     def __str__(self) -> str:
         where = "" if np.isnan(self.station) else f" at station {self.station:g} m"
         return f"{self.name.replace('_', ' ')}{where}"

@@ -25,6 +25,10 @@ class CertainPassageWarning(AscentwindWarning):
     """A limit lies below the mean, so that nearly every flight passes it."""
 
 
+class UncheckedStationsWarning(AscentwindWarning):
+    """A limit over stations ends before the vehicle does, and what lies beyond it is not looked at."""
+
+
 def checked_probabilities(probabilities: float | Iterable[float]) -> tuple[float, ...]:
     """Return probabilities as they are given.
 

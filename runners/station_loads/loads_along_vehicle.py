@@ -14,6 +14,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from ...codegen.system.evaluation import MatrixEvaluator
 from ...model.equations.load_components import component_columns, deviation_output
 from ...model.equations.loads import axial_force, axial_noise
 from ...model.equations.noise_loads import noise_load
@@ -102,9 +103,10 @@ def load_rows(
     executable = components.executable.with_numbers(groups=case.with_means.groups)
     nodes = time_nodes(executable, at)
     sides = [interval_before(executable, float(node)) for node in nodes]
-    matrices = [executable.matrices(node, here.low, here.high) for node, here in zip(nodes, sides, strict=True)]
-    state = np.array([m["C"][outputs] for m in matrices])
-    direct = np.array([(m["G"] @ m["inputs"])[outputs, 0] for m in matrices])
+    evaluate = MatrixEvaluator(executable, ("C", "G", "inputs"))
+    matrices = [evaluate(float(node), here.low, here.high) for node, here in zip(nodes, sides, strict=True)]
+    state = np.array([C[outputs] for C, _, _ in matrices])
+    direct = np.array([(G @ inputs)[outputs, 0] for _, G, inputs in matrices])
     rows = along.rows[:, chosen]
     return LoadRows(
         at,
@@ -183,7 +185,7 @@ def every_load_along_vehicle(
 
 def _dataset(
     case: Case,
-    components: Study,
+    components: Case,
     vehicle: Vehicle,
     load: str,
     found: ResponseStatistics,

@@ -12,8 +12,8 @@ import xarray as xr
 from ascentwind.model.vehicle.shipped import built_in_vehicles
 from ascentwind.runners.cli.app import main
 from ascentwind.runners.construct.vehicle_figures import FIGURES
+from ascentwind.runners.station_loads.loads_along_vehicle import LOADS
 from ascentwind.runners.views.along_vehicle_files import COLUMNS
-from ascentwind.runners.views.loads_along_vehicle import LOADS
 
 
 @pytest.fixture
