@@ -348,7 +348,7 @@ class Study(Case):
         window : (float, float), optional
             As for :meth:`flight_load`, s.
         probability : float
-            Of which margins are.
+            A probability, that margins are of.
         sides : {'both', 'upper', 'lower'}
         draws : int
             Paths of the importance sampling.
