@@ -158,7 +158,7 @@ def check_agreement(toml: Path, file: VehicleFile, construction: Construction) -
         for key in ("table", "local", "shear", "axial"):
             entry = getattr(load, key)
             named = None if entry is None else station_in_name(entry.file)
-            if named is not None and not named[0] <= load.station_m <= named[1]:
+            if entry is not None and named is not None and not named[0] <= load.station_m <= named[1]:
                 refuse(
                     f"is {entry.file}, but would hold station {load.station_m:g} m; name it after that station",
                     f"loads.{i}.{key}.file",

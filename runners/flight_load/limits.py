@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -45,18 +46,15 @@ def limit_passage(
     chosen, flown = checked_sides(sides), checked_window(case, window)
     table = limits if isinstance(limits, Limits) else Limits.read(limits)
     _refuse_unknown(case, table)
-    for name, unit in table.units.items():
-        table.of(name, _unit(case, table, name) or unit, np.array(flown))
-    chain = window_chain(case, flown, STEPS)
-    parts = [_station_rows(case, table, chain, n) if table.station is not None else _output_row(case, table, chain, n)
-             for n in table.values]  # fmt: skip
-    loads = [load for part in parts for load in part[0]]
-    row, mean, limit = (np.concatenate([part[k] for part in parts], axis=1) for k in (1, 2, 3))
-    process = ManyOutputs(chain, row, mean)
-    varies = process.std.max(axis=0) > 0
-    if not varies.any():
-        refuse_without_variance(" and ".join(table.values), process)
-    return Passage(case, loads, process, limit, chosen, design, draws, seed)
+    for name in table.values:
+        table.of(name, _unit(case, table, name), np.array(flown))
+    states = window_chain(case, flown, STEPS)
+    rows_of = _output_row if table.station is None else _station_rows
+    loads, rows, means, given = zip(*(rows_of(case, table, states, name) for name in table.values), strict=True)
+    process = ManyOutputs(states, np.concatenate(rows, axis=1), np.concatenate(means, axis=1))
+    refuse_without_variance(" and ".join(table.values), process)
+    limit = np.concatenate(given, axis=1)
+    return Passage(case, tuple(chain.from_iterable(loads)), process, limit, chosen, design, draws, seed)
 
 
 def _refuse_unknown(case: Case, table: Limits) -> None:
@@ -72,17 +70,17 @@ def _unit(case: Case, table: Limits, name: str) -> str:
     return LOADS[name] if table.station is not None else case.system.outputs[case.system.output_index(name)].unit
 
 
-def _output_row(case: Case, table: Limits, chain: MarkovChain, name: str) -> Rows:
+def _output_row(case: Case, table: Limits, states: MarkovChain, name: str) -> Rows:
     """Return a response: what it is, its row (m, 1, n), its mean and its limit (m, 1)."""
     which, unit = case.system.output_index(name), _unit(case, table, name)
-    limit = table.of(name, unit, chain.times)
-    return [LimitedLoad(name, unit)], chain.output[:, [which]], chain.mean[:, [which]], limit
+    limit = table.of(name, unit, states.times)
+    return [LimitedLoad(name, unit)], states.output[:, [which]], states.mean[:, [which]], limit
 
 
-def _station_rows(case: Case, table: Limits, chain: MarkovChain, name: str) -> Rows:
+def _station_rows(case: Case, table: Limits, states: MarkovChain, name: str) -> Rows:
     """Return a load at the vehicle's stations within those of the table: rows (m, s, n), means and limits (m, s)."""
-    found = load_rows(case, chain.times.tolist(), load=name)
-    limit, stations = table.of(name, LOADS[name], chain.times), table.station
+    found = load_rows(case, states.times.tolist(), load=name)
+    limit, stations = table.of(name, LOADS[name], states.times), table.station
     assert stations is not None
     inside = (found.station >= stations[0] - SAME_STATION) & (found.station <= stations[-1] + SAME_STATION)
     if not inside.any():
@@ -99,7 +97,7 @@ def _station_rows(case: Case, table: Limits, chain: MarkovChain, name: str) -> R
         )
         warnings.warn(UncheckedStationsWarning(text), stacklevel=4)
     at = np.flatnonzero(inside)
-    mean = np.einsum("msn,mn->ms", found.state[:, at], case.mean_states(chain.times)) + found.direct_mean[:, at]
+    mean = np.einsum("msn,mn->ms", found.state[:, at], case.mean_states(states.times)) + found.direct_mean[:, at]
     own = np.stack([np.interp(found.station[at], stations, row) for row in limit])
     loads = [LimitedLoad(name, LOADS[name], float(s)) for s in found.station[at]]
     return loads, found.state[:, at], mean, own

@@ -188,8 +188,8 @@ class FlightLoad:
     @cached_property
     def exceedance(self) -> xr.DataArray:
         """Probability of passing each level from about 0.5 down to 1e-7, (level,), with ``standard_error``."""
-        ends = [self._instant_level(np.log(p)) for p in (0.5, 1e-8)]
-        values, found, errors = np.linspace(*ends, 36), [], []
+        begin, end = (self._instant_level(np.log(p)) for p in (0.5, 1e-8))
+        values, found, errors = np.linspace(begin, end, 36), [], []
         for number, group in enumerate(np.split(values, 12)):
             draws = draw_beyond(self.process, self._boundary(group[0]), self._random(2, number), self.draws // 4)
             for value in group:
@@ -360,7 +360,7 @@ def flight_load(
     case: Case,
     response: str,
     window: tuple[float, float] | None,
-    probabilities: Iterable[float],
+    probabilities: float | Iterable[float],
     sides: Sides,
     draws: int,
     seed: int,

@@ -120,7 +120,7 @@ def find_level(
     while instant(high) > 0:
         high += 2 * size
     # a path passes more often than its worst instant: the number lies above the one found from that
-    near = float(brentq(instant, low, high, xtol=SOLVED * size))
+    near = brentq(instant, low, high, xtol=SOLVED * size, full_output=False)
     step = 0.02 * size
     rough, _ = _solve(draw_beyond(process, boundary_of(near), random, ROUGH), probability, boundary_of, near, step)
     start = max(near, rough - step)
@@ -145,5 +145,5 @@ def _solve(
         high = low + step
         while excess(high) > 0:
             low, high = high, high + step
-        value = float(brentq(excess, low, high, xtol=SOLVED * step))
+        value = brentq(excess, low, high, xtol=SOLVED * step, full_output=False)
     return value, (excess(value) - excess(value + 0.1 * step)) / (0.1 * step)

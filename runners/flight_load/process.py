@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,54 +70,6 @@ class Steps:
         between = near[:, 1::2]
         seen[:, : between.shape[1]] |= between
         return Steps.of(paths[:, ::2], seen)
-
-
-class Process(Protocol):
-    """r outputs on a grid of which paths are drawn, and on a finer one on which they are seen.
-
-    Attributes
-    ----------
-    drawn, seen : Grid
-    std : (m, r) array
-        Standard deviation at the points drawn.
-    between : (m, r) array
-        How far a path goes between two points drawn without being seen at either: a few of its standard deviations
-        there, given both.
-    stride : int
-        Steps of the grid seen in one of the grid drawn.
-    """
-
-    @property
-    def drawn(self) -> Grid: ...
-    @property
-    def seen(self) -> Grid: ...
-    @property
-    def std(self) -> NDArray[np.float64]: ...
-    @property
-    def between(self) -> NDArray[np.float64]: ...
-    @property
-    def stride(self) -> int: ...
-
-    def deviations(self, random: np.random.Generator, count: int) -> NDArray[np.float64]:
-        """Return drawn deviations from the mean, (count, m, r)."""
-        ...
-
-    def covariances(self, points: NDArray[np.intp], outputs: NDArray[np.intp]) -> NDArray[np.float64]:
-        """Return covariances of everything with chosen outputs at chosen points, (len(points), m, r)."""
-        ...
-
-    def restricted(self, points: slice, outputs: NDArray[np.intp]) -> Process | None:
-        """Return the process at some consecutive points drawn and of some outputs; None where that saves nothing."""
-        ...
-
-    def steps_near(
-        self, deviations: NDArray[np.float64], near: NDArray[np.bool_], random: np.random.Generator
-    ) -> tuple[Steps, Steps]:
-        """Return the steps of drawn deviations, conditioned or not, beside points ``near`` (count, m).
-
-        On the grid seen, where what lies between the points drawn is drawn as well, and on every second point of it.
-        """
-        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,6 +137,8 @@ class OneOutput:
     halvings : tuple of Halving
         From the grid drawn to the grid seen.
     between : (m, 1) array
+        How far a path goes between two points drawn without being seen at either: a few of its standard deviations
+        there, given both.
     """
 
     drawn: Grid
@@ -196,10 +149,12 @@ class OneOutput:
 
     @cached_property
     def std(self) -> NDArray[np.float64]:
+        """Standard deviation at the points drawn, (m, 1)."""
         return np.sqrt(np.maximum(np.diagonal(self.covariance), 0.0))[:, None]
 
     @property
     def stride(self) -> int:
+        """Steps of the grid seen in one of the grid drawn."""
         return 2 ** len(self.halvings)
 
     @cached_property
@@ -229,17 +184,24 @@ class OneOutput:
         return factor
 
     def deviations(self, random: np.random.Generator, count: int) -> NDArray[np.float64]:
+        """Return drawn deviations from the mean, (count, m, r)."""
         return (random.standard_normal((count, self.drawn.times.size)) @ self._factor.T)[:, :, None]
 
     def covariances(self, points: NDArray[np.intp], outputs: NDArray[np.intp]) -> NDArray[np.float64]:
+        """Return covariances of everything with chosen outputs at chosen points, (len(points), m, r)."""
         return self.covariance[points][:, :, None]
 
-    def restricted(self, points: slice, outputs: NDArray[np.intp]) -> Process | None:
+    def restricted(self, points: slice, outputs: NDArray[np.intp]) -> ManyOutputs | None:
+        """Return the process at some consecutive points drawn and of some outputs; None where that saves nothing."""
         return None
 
     def steps_near(
         self, deviations: NDArray[np.float64], near: NDArray[np.bool_], random: np.random.Generator
     ) -> tuple[Steps, Steps]:
+        """Return the steps of drawn deviations, conditioned or not, beside points ``near`` (count, m).
+
+        On the grid seen, where what lies between the points drawn is drawn as well, and on every second point of it.
+        """
         if not self.halvings:
             return Steps.of(deviations, near), Steps.of_every_second(deviations, near)
         found = deviations[:, :, 0]
@@ -395,7 +357,8 @@ class ManyOutputs:
         step = np.sqrt(np.max(np.diff(self.chain.times)))
         return SEVERAL / 2 * np.abs(self.drawn.diffusion) * step
 
-    def restricted(self, points: slice, outputs: NDArray[np.intp]) -> Process | None:
+    def restricted(self, points: slice, outputs: NDArray[np.intp]) -> ManyOutputs | None:
+        """Return the process at some consecutive points drawn and of some outputs; None where that saves nothing."""
         return ManyOutputs(self.chain.part(points), self.row[points][:, outputs], self.mean[points][:, outputs])
 
     @cached_property
@@ -422,6 +385,7 @@ class ManyOutputs:
         return np.ascontiguousarray((self.row * self._scale).swapaxes(1, 2))
 
     def deviations(self, random: np.random.Generator, count: int) -> NDArray[np.float64]:
+        """Return drawn deviations from the mean, (count, m, r)."""
         first, roots = self._roots
         m, _, n = self.row.shape
         states = np.empty((m, count, n))
@@ -431,6 +395,7 @@ class ManyOutputs:
         return self._seen(states)
 
     def covariances(self, points: NDArray[np.intp], outputs: NDArray[np.intp]) -> NDArray[np.float64]:
+        """Return covariances of everything with chosen outputs at chosen points, (len(points), m, r)."""
         m, _, n = self.row.shape
         count = points.size
         states = np.zeros((m, count, n))
@@ -459,8 +424,15 @@ class ManyOutputs:
     def steps_near(
         self, deviations: NDArray[np.float64], near: NDArray[np.bool_], random: np.random.Generator
     ) -> tuple[Steps, Steps]:
+        """Return the steps of drawn deviations, conditioned or not, beside points ``near`` (count, m).
+
+        On the grid seen, where what lies between the points drawn is drawn as well, and on every second point of it.
+        """
         return Steps.of(deviations, near), Steps.of_every_second(deviations, near)
 
     def _seen(self, states: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return outputs (count, m, r) of states (m, count, n)."""
         return np.ascontiguousarray((states / self._scale @ self._rows_on_scale).swapaxes(0, 1))
+
+
+Process = OneOutput | ManyOutputs

@@ -63,9 +63,10 @@ def checked_sides(sides: str) -> Sides:
     ------
     UnknownNameError
     """
-    if sides not in get_args(Sides):
-        raise UnknownNameError("choice of sides", str(sides), get_args(Sides))
-    return sides
+    known: tuple[Sides, ...] = get_args(Sides)
+    if sides not in known:
+        raise UnknownNameError("choice of sides", str(sides), known)
+    return known[known.index(sides)]
 
 
 def checked_draws(draws: int, seed: int) -> None:

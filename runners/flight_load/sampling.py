@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import log_ndtr, logsumexp, ndtri_exp
+from scipy.special import log_ndtr, ndtri_exp
 
 from .crossings import Boundary, Sightings, sightings
 from .process import Process
@@ -163,7 +163,7 @@ def _paths_beyond(
     """Return deviations (count, m, r) on the grid drawn, where paths are near the boundary (count, m), and weights."""
     inner = boundary.at(slice(None, None, process.stride)).drawn_in(process.between)
     log_p = instant_probabilities(process, inner)
-    log_sum = float(logsumexp(log_p))
+    log_sum = float(np.logaddexp.reduce(log_p, axis=None))
     deviations = process.deviations(random, count)
     if not np.isfinite(log_sum):  # nothing ever comes near
         return deviations, np.zeros(deviations.shape[:2], bool), np.zeros(count)
@@ -181,5 +181,5 @@ def _paths_beyond(
     drawn = process.drawn.mean + deviations
     number = (drawn > inner.upper).sum(axis=(1, 2)) + (drawn < inner.lower).sum(axis=(1, 2))
     close = inner.drawn_in(process.between)
-    near = ((drawn > close.upper) | (drawn < close.lower)).any(axis=2)
+    near = np.any((drawn > close.upper) | (drawn < close.lower), axis=2)
     return deviations, near, np.exp(log_sum - np.log(np.maximum(number, 1)))

@@ -293,7 +293,7 @@ def _lateral_rows(
     if not file.options.local_angle_of_attack:
         columns |= {column.name: zero for column in local_load_columns(len(vehicle.bending))}
     if slosh_reaction:
-        weights = {tank: forward[tank] if load == BENDING_MOMENT else zero for tank in tanks}
+        weights = {tank: zero + (forward[tank] if load == BENDING_MOMENT else 0.0) for tank in tanks}
         columns |= _with_reaction(columns, weights, flight)
     if file.options.p_delta:
         for i in range(1, len(vehicle.bending) + 1):
