@@ -16,6 +16,9 @@ CONFIDENCE = 1.96  # standard errors of a 95 % interval
 ROUGH = 400  # draws that find about where a level lies
 ORDER = 1.5  # of the error left by the grid: between that of a smooth path, 2, and of a rough one with bridges, 1
 SOLVED = 1e-10  # relative, to which a level is solved for
+SURE = 2.0  # standard errors by which the number is thought to lie farther out than paths are drawn for
+LEAST_MARGIN = 0.02  # and at least so much of its size
+SLOPE_STEP = 0.2  # of ln P, over which its slope is taken
 
 
 @dataclass(frozen=True)
@@ -121,29 +124,53 @@ def find_level(
         high += 2 * size
     # a path passes more often than its worst instant: the number lies above the one found from that
     near = brentq(instant, low, high, xtol=SOLVED * size, full_output=False)
-    step = 0.02 * size
-    rough, _ = _solve(draw_beyond(process, boundary_of(near), random, ROUGH), probability, boundary_of, near, step)
-    start = max(near, rough - step)
+    least = LEAST_MARGIN * size
+    rough = _solve(draw_beyond(process, boundary_of(near), random, ROUGH), probability, boundary_of, near, least)
+    margin = max(least, SURE * rough.error / rough.slope) if rough.slope > 0 else least
+    start = max(near, rough.value) - margin
     draws = draw_beyond(process, boundary_of(start), random, count)
-    value, slope = _solve(draws, probability, boundary_of, start, step)
+    while (solved := _solve(draws, probability, boundary_of, start, least)).beyond:
+        margin *= 2
+        start -= margin
+        draws = draw_beyond(process, boundary_of(start), random, count)
+    value, slope = solved.value, solved.slope
     boundary = boundary_of(value)
     found = estimate(draws, boundary)
     half = CONFIDENCE * found.standard_error / probability / slope if slope > 0 else 0.0
     return Level(value, (value - half, value + half), boundary, found, slope, draws)
 
 
+@dataclass(frozen=True)
+class _Solved:
+    """A number found from draws: -d ln P / d number and the relative error of P there.
+
+    ``beyond``: it lies nearer than the boundary that was drawn for, which is returned in its place.
+    """
+
+    value: float
+    slope: float
+    error: float
+    beyond: bool
+
+
 def _solve(
     draws: Draws, probability: float, boundary_of: Callable[[float], Boundary], low: float, step: float
-) -> tuple[float, float]:
-    """Return the number and -d ln P / d number there."""
-
+) -> _Solved:
     def excess(u: float) -> float:
         return float(np.log(max(draws.contributions(boundary_of(u)).mean(), 1e-300) / probability))
 
+    first = excess(low)
     value = low
-    if excess(low) > 0:
+    if first > 0:
         high = low + step
         while excess(high) > 0:
-            low, high = high, high + step
+            low, high = high, high + 2 * (high - low)
         value = brentq(excess, low, high, xtol=SOLVED * step, full_output=False)
-    return value, (excess(value) - excess(value + 0.1 * step)) / (0.1 * step)
+    at_value, farther = excess(value), step
+    for _ in range(2):  # over a step in which enough of the paths stop passing
+        slope = (at_value - excess(value + farther)) / farther
+        farther = SLOPE_STEP / slope if slope > 0 else 10 * farther
+    each = draws.contributions(boundary_of(value))
+    mean = float(each.mean())
+    error = float(each.std(ddof=1) / np.sqrt(each.size) / mean) if mean > 0 else 1.0
+    return _Solved(value, slope, error, first < -SOLVED)
