@@ -245,8 +245,7 @@ def one_output(
     sources : sequence of int, optional
         Numbers of those that act; all without it.
     """
-    acting = slice(None) if sources is None else list(sources)
-    P = chain.covariance[:, acting].sum(axis=1)
+    P = chain.covariance(sources)
     seen = Grid(chain.times, mean[:, None], _diffusion(row[:, None] @ chain.noise_matrix))
     stride = 2**halvings
     at = slice(None, None, stride)
@@ -369,7 +368,7 @@ class ManyOutputs:
 
     @cached_property
     def _P(self) -> NDArray[np.float64]:
-        return self.chain.covariance.sum(axis=1)
+        return self.chain.covariance()
 
     @cached_property
     def std(self) -> NDArray[np.float64]:

@@ -58,6 +58,10 @@ def window_chain(
 def _chain(case: Case, times: NDArray[np.float64], relative_tolerance: float) -> MarkovChain:
     executable = case.with_means
     nodes = np.unique(time_nodes(executable, times))
+    if nodes.size < times.size:
+        raise TimeRangeError(
+            f"the window from {times[0]:g} to {times[-1]:g} s is too short for {times.size - 1} steps; ask for a longer one"
+        )
     engine = available_sweep(case.executable)
     if engine is None:
         return chain_by_exact_steps(executable, nodes, SUBSTEP)

@@ -8,8 +8,8 @@ compiled.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -56,11 +56,14 @@ class MarkovChain:
     output: NDArray[np.float64]
     mean: NDArray[np.float64]
 
-    @cached_property
-    def covariance(self) -> NDArray[np.float64]:
-        """Covariance P of the states at every time and from every source, (m, sources, n, n)."""
-        P = [self.start]
-        for Phi, Q in zip(self.transition, self.added, strict=True):
+    def covariance(self, sources: Sequence[int] | None = None) -> NDArray[np.float64]:
+        """Return the covariance P of the states at every time, (m, n, n), from some sources by number or from all.
+
+        It is not kept: of all sources and times it is as large as the chain itself.
+        """
+        acting = slice(None) if sources is None else list(sources)
+        P = [self.start[acting].sum(axis=0)]
+        for Phi, Q in zip(self.transition, self.added[:, acting].sum(axis=1), strict=True):
             P.append(Phi @ P[-1] @ Phi.T + Q)
         return np.array(P)
 
@@ -68,11 +71,14 @@ class MarkovChain:
         """Return the chain over consecutive times."""
         first, last, _ = points.indices(self.times.size)
         steps = slice(first, last - 1)
+        start = self.start
+        for Phi, Q in zip(self.transition[:first], self.added[:first], strict=True):
+            start = Phi @ start @ Phi.T + Q
         return MarkovChain(
             self.times[points],
             self.transition[steps],
             self.added[steps],
-            self.covariance[first],
+            start,
             self.state_matrix[points],
             self.noise_matrix[points],
             self.output[points],
