@@ -118,7 +118,7 @@ def _rounded(value: Real) -> float:
     try:
         return float(value)
     except OverflowError:
-        return math.copysign(math.inf, int(value))
+        return math.copysign(math.inf, math.floor(value))
 
 
 def check_keys(kind: str, given: Mapping[str, object], known: Iterable[str]) -> None:

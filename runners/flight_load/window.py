@@ -60,8 +60,8 @@ def _chain(case: Case, times: NDArray[np.float64], relative_tolerance: float) ->
     nodes = np.unique(time_nodes(executable, times))
     if nodes.size < times.size:
         raise TimeRangeError(
-            f"a window of {times[-1] - times[0]:g} s at {times[0]:g} s is too short for {times.size - 1} steps; ask for "
-            "a longer one"
+            f"a window of {times[-1] - times[0]:g} s at {times[0]:g} s is too short for {times.size - 1} steps; "
+            "ask for a longer one"
         )
     engine = available_sweep(case.executable)
     if engine is None:
