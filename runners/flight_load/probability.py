@@ -123,7 +123,7 @@ def find_level(
     while instant(high) > 0:
         high += 2 * size
     # a path passes more often than its worst instant: the number lies above the one found from that
-    near = brentq(instant, low, high, xtol=SOLVED * size, full_output=False)
+    near = _root(instant, low, high, SOLVED * size)
     least = LEAST_MARGIN * size
     rough = _solve(draw_beyond(process, boundary_of(near), random, ROUGH), probability, boundary_of, near, least)
     margin = max(least, SURE * rough.error / rough.slope) if rough.slope > 0 else least
@@ -138,6 +138,12 @@ def find_level(
     found = estimate(draws, boundary)
     half = CONFIDENCE * found.standard_error / probability / slope if slope > 0 else 0.0
     return Level(value, (value - half, value + half), boundary, found, slope, draws)
+
+
+def _root(function: Callable[[float], float], low: float, high: float, accuracy: float) -> float:
+    found = brentq(function, low, high, xtol=accuracy, full_output=False)
+    assert isinstance(found, float)
+    return found
 
 
 @dataclass(frozen=True)
@@ -165,7 +171,7 @@ def _solve(
         high = low + step
         while excess(high) > 0:
             low, high = high, high + 2 * (high - low)
-        value = brentq(excess, low, high, xtol=SOLVED * step, full_output=False)
+        value = _root(excess, low, high, SOLVED * step)
     at_value, farther = excess(value), step
     for _ in range(2):  # over a step in which enough of the paths stop passing
         slope = (at_value - excess(value + farther)) / farther
