@@ -14,6 +14,7 @@ from ...model.errors import ParameterValueError
 Sides = Literal["both", "upper", "lower"]
 HALVINGS = 60
 MOST_RUNS = 10**9
+MOST_SAMPLES = 1e6  # for which the noncentral t is computed; beyond, the delta method is as good and does not fail
 
 
 def instant_level(mean: ArrayLike, std: ArrayLike, probability: float, sides: Sides = "both") -> NDArray[np.float64]:
@@ -115,7 +116,7 @@ def level_sampling_interval(
     ParameterValueError
     """
     degrees = _degrees(samples, confidence)
-    if other_std == 0:
+    if other_std == 0 and samples <= MOST_SAMPLES:
         noncentral = sigmas * np.sqrt(samples)
         at = nct.ppf([0.5 * (1 - confidence), 0.5 * (1 + confidence)], degrees, noncentral)
         low, high = mean + wind_std * at / np.sqrt(samples)
@@ -128,7 +129,7 @@ def level_sampling_interval(
 
 
 def _degrees(samples: float, confidence: float) -> float:
-    if not samples > 1:
+    if not (samples > 1 and np.isfinite(samples)):
         raise ParameterValueError(f"{samples:g} independent profiles tell nothing of a spread; give more than one")
     if not 0.0 < confidence < 1.0:
         raise ParameterValueError(f"a confidence of {confidence:g} is none; give one between 0 and 1, such as 0.95")
@@ -159,7 +160,7 @@ def monte_carlo_runs(probability: float, risk: float = 0.10, failures: int = 0) 
     """
     if not (0.0 < probability < 1.0 and 0.0 < risk < 1.0):
         raise ParameterValueError("a probability and a risk lie between 0 and 1")
-    if failures < 0 or failures != int(failures):
+    if not (np.isfinite(failures) and failures >= 0 and failures == int(failures)):
         raise ParameterValueError(f"{failures} failures cannot be counted; give a whole number of 0 or more")
     low, high = int(failures), int(failures) + 1
     while binom.cdf(failures, high, probability) > risk:
