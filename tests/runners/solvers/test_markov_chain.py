@@ -5,12 +5,12 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 import pytest
+from switched_system import NOMINAL, pieces, switched_system
 
 from ascentwind.model import define_system
 from ascentwind.runners import Study, Sweep
 from ascentwind.runners.solvers.markov_chain import MarkovChain, chain_by_exact_steps, chain_by_sweep
 from ascentwind.runners.solvers.sweep import available_sweep
-from switched_system import NOMINAL, pieces, switched_system
 
 RATE = 0.7
 
