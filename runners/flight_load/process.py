@@ -266,15 +266,24 @@ def one_output(
     if halvings:
         band = _band(chain, row, P, (2 * NEIGHBOURS - 1) * stride)
         found = [_halving(band, stride // 2**k) for k in range(halvings)]
-    middle = (R[1:-1, :][:, 1:-1], R[:-2, :][:, 2:], R[2:, :][:, 1:-1], R[:-2, :][:, 1:-1])
-    own, across, after, before = (np.diagonal(x) for x in middle)
-    ends = np.diagonal(R)
-    unseen = own + 0.25 * (ends[:-2] + ends[2:]) + 0.5 * across - after - before  # of a point given its neighbours
-    between = np.zeros(m)
-    if m > 2:
-        between[1:-1] = SEVERAL * np.sqrt(np.maximum(unseen, 0.0) / 2)
+    lags = (np.diagonal(R, lag)[:, None] for lag in (0, 1, 2))
+    return OneOutput(drawn, seen, R, tuple(found), _unseen(*lags))
+
+
+def _unseen(
+    variance: NDArray[np.float64], next_one: NDArray[np.float64], next_but_one: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return how far a path goes between two points without being seen at either, (m, r).
+
+    From the covariances (m, r), (m - 1, r) and (m - 2, r) of each point with itself, the next and the one after: what a
+    point is off the middle of its neighbours; half its variance in the middle of a step, or less.
+    """
+    between = np.zeros_like(variance)
+    if len(variance) > 2:
+        off = variance[1:-1] + 0.25 * (variance[:-2] + variance[2:]) + 0.5 * next_but_one - next_one[1:] - next_one[:-1]
+        between[1:-1] = SEVERAL * np.sqrt(np.maximum(off, 0.0) / 2)
         between[0], between[-1] = between[1], between[-2]
-    return OneOutput(drawn, seen, R, tuple(found), between[:, None])
+    return between
 
 
 def _band(chain: MarkovChain, row: NDArray[np.float64], P: NDArray[np.float64], width: int) -> NDArray[np.float64]:
@@ -353,8 +362,13 @@ class ManyOutputs:
 
     @cached_property
     def between(self) -> NDArray[np.float64]:
-        step = np.sqrt(np.max(np.diff(self.chain.times)))
-        return SEVERAL / 2 * np.abs(self.drawn.diffusion) * step
+        """How far a path goes between two points without being seen at either, (m, r)."""
+        seen = self._P[:-1] @ self.row[:-1].swapaxes(1, 2)  # P(t_k) C(t_k)', (m - 1, n, r)
+        once = self.chain.transition @ seen
+        twice = self.chain.transition[1:] @ once[:-1]
+        next_one = np.einsum("mrn,mnr->mr", self.row[1:], once)
+        next_but_one = np.einsum("mrn,mnr->mr", self.row[2:], twice)
+        return _unseen(self.std**2, next_one, next_but_one)
 
     def restricted(self, points: slice, outputs: NDArray[np.intp]) -> ManyOutputs | None:
         """Return the process at some consecutive points drawn and of some outputs; None where that saves nothing."""

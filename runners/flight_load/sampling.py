@@ -17,10 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import log_ndtr, ndtri_exp
 
+from ...codegen.toolchain.interruption import Workers
+from ..solvers.cores import available_cores
 from .crossings import Boundary, Sightings, sightings
 from .process import Process
 
 LEFT_OUT = 2e-3  # of the probability, at most, that is passed only where no path is drawn
+TOGETHER = 512  # paths that a thread draws at a time, from a stream of their own: as many threads, the same numbers
 MEMORY = 2e7  # numbers in an array of paths at a time
 
 
@@ -124,18 +127,18 @@ def draw_beyond(
 
 
 def _drawn(process: Process, boundary: Boundary, random: np.random.Generator, count: int, keep: bool) -> Draws:
-    largest = max(16, int(MEMORY / process.drawn.mean.size))
-    weights, near, coarser, kept = [], [], [], []
-    while count > 0:
-        part = min(count, largest)
-        deviations, close, weight = _paths_beyond(process, boundary, random, part)
-        steps, every_second = process.steps_near(deviations, close, random)
-        weights.append(weight)
-        near.append(sightings(part, steps, boundary, process.seen))
-        coarser.append(sightings(part, every_second, boundary, process.seen, every=2))
-        if keep:
-            kept.append(deviations)
-        count -= part
+    largest = min(TOGETHER, max(16, int(MEMORY / process.drawn.mean.size)))
+    sizes = [min(largest, count - first) for first in range(0, count, largest)]
+
+    def part(size: int, own: np.random.Generator) -> tuple[Sightings, Sightings, NDArray, NDArray]:
+        deviations, close, weight = _paths_beyond(process, boundary, own, size)
+        steps, every_second = process.steps_near(deviations, close, own)
+        near = sightings(size, steps, boundary, process.seen)
+        coarser = sightings(size, every_second, boundary, process.seen, every=2)
+        return near, coarser, weight, deviations if keep else weight
+
+    with Workers(min(len(sizes), available_cores())) as pool:
+        near, coarser, weights, kept = zip(*pool.map(part, sizes, random.spawn(len(sizes))), strict=True)
     sighted = Sightings.joined(near), Sightings.joined(coarser)
     return Draws(process, np.concatenate(weights), *sighted, np.concatenate(kept) if keep else None)
 
