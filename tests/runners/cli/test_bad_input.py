@@ -102,7 +102,7 @@ def test_unstable_loop_is_warned_of_with_time_and_root_and_still_computed(as504)
     study = as504.with_parameters({"control.T1.gain": -0.2, "control.T2.gain": 0.1})
     with pytest.warns(UnstableSystemWarning, match=r"frozen at [\d.]+ s is unstable: root \+[\d.e-]+ .*rad/s in \w+"):
         found = study.response_statistics([40.0])
-    assert (found.variance > 0).all()
+    assert (found.variance.sel(response=["bending_moment", "angle_of_attack", "engine_angle"]) > 0).all()
 
 
 def test_white_noise_reaching_the_bending_moment_is_refused(edit):

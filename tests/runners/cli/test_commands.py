@@ -32,6 +32,7 @@ TAKE_CHANGES = [
     ["tolerance", "as504"],
     ["sensitivity", "as504"],
     ["mean", "as504"],
+    ["flight-load", "as504"],
     ["inspect", "as504", "--time", "70"],
     ["equations"],
     ["regenerate", "as504"],

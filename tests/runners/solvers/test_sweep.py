@@ -8,6 +8,7 @@ import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
 
 import casadi as ca
 import numpy as np
@@ -29,7 +30,7 @@ from ascentwind.model.vehicle.shipped import built_in_vehicles
 from ascentwind.runners.solvers.adjoint import AdjointSolver
 from ascentwind.runners.solvers.cores import available_cores
 from ascentwind.runners.solvers.covariance import covariance_equation
-from ascentwind.runners.solvers.mean_response import with_mean_tables
+from ascentwind.runners.solvers.mean_response import mean_response, with_mean_tables
 from ascentwind.runners.solvers.sweep import BatchError, batch, forward_mean, sweep
 from ascentwind.runners.statistics.cvodes import Cvodes
 from ascentwind.runners.study import Study
@@ -199,8 +200,10 @@ def test_weighting_functions_are_the_adjoint_runs(as504):
 
 
 def test_mean_tables_are_those_of_cvodes(as504):
-    engine, expected, executable = as504
+    engine, _, executable = as504
     found = with_mean_tables(executable, forward_mean(engine))
+    # CVODES begins anew at every switch, with its lowest order: at its usual 1e-9 it is 1e-7 off there
+    expected = with_mean_tables(executable, partial(mean_response, relative_tolerance=1e-12))
     for ours, theirs in zip(found.groups, expected.groups, strict=True):
         scale = np.abs(theirs.coefficients).max(axis=(0, 1))
         scale[scale == 0] = 1.0
@@ -215,14 +218,16 @@ def test_batch_is_each_set_by_itself(as504):
     times = [11.0, 20.0]
     results = batch(engine, executable, sets, times, relative_tolerance=1e-6)
     np.testing.assert_array_equal(results[0].covariance, results[2].covariance)
-    np.testing.assert_allclose(results[1].mean, 2 * results[0].mean, rtol=1e-6)
+    across = [executable.system.output_index(name) for name in ("bending_moment", "angle_of_attack", "engine_angle")]
+    np.testing.assert_allclose(results[1].mean[:, across], 2 * results[0].mean[:, across], rtol=1e-6)
     # twice the mean: twice the deviation by thrust, the same by wind
     thrust = executable.system.sources.index("thrust")
-    np.testing.assert_allclose(results[1].variance[..., thrust], 4 * results[0].variance[..., thrust], rtol=1e-5)
+    by_thrust = (member.variance[:, across, thrust] for member in results[:2])
+    np.testing.assert_allclose(4 * next(by_thrust), next(by_thrust), rtol=1e-5)
     wind = executable.system.sources.index("wind")
     np.testing.assert_allclose(results[1].variance[..., wind], results[0].variance[..., wind], rtol=1e-5)
     # a table of the mean that is still zero gives no variance by thrust: the batch must have filled it
-    assert (results[0].variance[..., thrust] > 0).all()
+    assert (results[0].variance[:, across, thrust] > 0).all()
 
 
 def test_threads_do_not_disturb_each_other(as504):
