@@ -26,7 +26,7 @@ from ...model.system.linear_system import LinearSystem
 from .cores import available_cores
 from .mean_response import FillMeans, MeanResponse, Respond, with_mean_tables
 from .step_budget import at_most, check_explicit_steps, naming_fastest_root
-from .time_nodes import Interval, intervals, on_flight, time_nodes
+from .time_nodes import Interval, intervals, on_flight, same_time, time_nodes
 from .tolerances import check_relative_tolerance
 from .typical_sizes import mean_misjudged, misjudged, sizes_of_sweep
 
@@ -218,8 +218,9 @@ def forward_mean(compiled: CompiledSweep, relative_tolerance: float = 1e-9) -> R
 
     def mean(of: ExecutableSystem, times: NDArray[np.float64]) -> MeanResponse:
         pieces = intervals(of, float(times[0]), float(times[-1]))
-        switched = [p.end for p in intervals(of, float(times[0]), float(times[-1]), pulses=False)]
-        within = np.setdiff1d([p.end for p in pieces], switched)
+        stops = np.array([p.end for p in pieces])
+        nearest = np.abs(stops[:, None] - times[np.clip(np.searchsorted(times, stops)[:, None] - [0, 1], 0, None)])
+        within = stops[nearest.min(axis=1) > same_time(of.system, times)]
         ends = np.unique(np.concatenate([times[1:], within]))
         which = np.searchsorted([p.end for p in pieces], ends)
         low, high = (np.array([getattr(p, side) for p in pieces])[which] for side in ("low", "high"))

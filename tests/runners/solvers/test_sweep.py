@@ -107,7 +107,10 @@ def test_agrees_with_cvodes_and_the_covariance_equation_at_ten_times(as504, refe
 def test_tolerance_is_met_and_the_estimate_covers_the_error(as504, reference, tolerance):
     engine, executable, _ = as504
     result = sweep(engine, executable, TEN, relative_tolerance=tolerance)
-    error = np.abs(np.sqrt(result.variance / reference[0]) - 1).max(axis=(1, 2))
+    reached = reference[0] > 0  # no wind reaches the axial force
+    assert (result.variance[~reached] == 0).all()
+    ratio = np.divide(result.variance, reference[0], out=np.ones_like(reference[0]), where=reached)
+    error = np.abs(np.sqrt(ratio) - 1).max(axis=(1, 2))
     assert error.max() < tolerance
     estimate = result.error_estimate.transpose(0, 2, 1).max(axis=(1, 2))
     # half a second after the start the thrust variance is tiny and the estimate several times too small
@@ -139,7 +142,8 @@ def test_agrees_with_the_covariance_equation(as504, source):
     for k, t in enumerate((11.0, 12.0)):
         C = executable.matrices(t, system.start, 105.0)["C"]
         expected = C @ solution.y[:, k].reshape(n, n) @ C.T
-        scale = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
+        size = np.where(np.diag(expected) > 0, np.diag(expected), 1.0)  # no wind reaches the axial force
+        scale = np.sqrt(np.outer(size, size))
         assert np.abs((result.covariance[k, s] - expected) / scale).max() < 1e-6
 
 
@@ -202,8 +206,7 @@ def test_weighting_functions_are_the_adjoint_runs(as504):
 def test_mean_tables_are_those_of_cvodes(as504):
     engine, _, executable = as504
     found = with_mean_tables(executable, forward_mean(engine))
-    # CVODES begins anew at every switch, with its lowest order: at its usual 1e-9 it is 1e-7 off there
-    expected = with_mean_tables(executable, partial(mean_response, relative_tolerance=1e-12))
+    expected = with_mean_tables(executable, partial(mean_response, relative_tolerance=1e-11))
     for ours, theirs in zip(found.groups, expected.groups, strict=True):
         scale = np.abs(theirs.coefficients).max(axis=(0, 1))
         scale[scale == 0] = 1.0
