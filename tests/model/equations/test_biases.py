@@ -71,7 +71,10 @@ def test_a_flight_has_one_bias(cache):
 def test_engines_agree_for_a_vehicle_with_every_bias(study, engine):
     assert study.system.sources == ("wind", "thrust", "center_of_pressure", *SOURCES)
     swept, other = study.response_statistics(TIMES), study.response_statistics(TIMES, engine=engine)
-    np.testing.assert_allclose(other["std"].values, swept["std"].values, rtol=2e-5)
+    # the shear that a misalignment leaves is a ten-thousandth of what its parts are: relative to the whole response
+    whole = swept["std"].sel(source="combined").values[:, :, None]
+    apart = np.abs(other["std"].values - swept["std"].values)
+    assert (apart <= 2e-5 * swept["std"].values + 1e-7 * whole).all()
     np.testing.assert_allclose(other["mean"].values, swept["mean"].values, rtol=2e-5)
 
 

@@ -265,9 +265,10 @@ def spoil(folder: Path, *tables: str, column: str) -> Path:
 
 def make_rigid(folder: Path) -> None:
     """Remove what modes and tanks put into the load; without them ``bending`` and ``slosh`` may be empty."""
-    for column in read_csv_table(folder / LOAD, "time", "s").columns:
-        if column.startswith(("bending_", "slosh_")):
-            spoil(folder, LOAD, column=column)
+    for table in (LOAD, "shear_station_25m.csv"):
+        for column in read_csv_table(folder / table, "time", "s").columns:
+            if column.startswith(("bending_", "slosh_", "p_delta_")):
+                spoil(folder, table, column=column)
 
 
 LOAD, MODE = "loads_station_25m.csv", "bending_2.csv"
