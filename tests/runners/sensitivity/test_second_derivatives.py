@@ -56,7 +56,8 @@ def test_closed_form(driven, quantity):
     assert d.attrs["value"] == pytest.approx(value.item(), rel=1e-10)
     np.testing.assert_allclose(d["derivative"], gradient.ravel(), rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(d["second_derivative"], hessian, rtol=1e-8, atol=1e-10)
-    assert d.attrs["asymmetry"] < 1e-12
+    # what is left is the rounding of sums over the grid, of a thousand steps and four nodes each
+    assert d.attrs["asymmetry"] < np.finfo(float).eps * 4 * d.attrs["steps"] * 10
 
 
 @pytest.mark.slow
