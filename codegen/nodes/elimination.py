@@ -59,6 +59,8 @@ def _plan(size: int, rows: tuple[int, ...], columns: tuple[int, ...]) -> NDArray
         order,
         [number[p, p] for p in order],
         number[list(rows), list(columns)],
+        rows,
+        columns,
         *lists(left, True),
         *lists(uppers, True),
         *lists(above, False),

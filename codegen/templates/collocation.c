@@ -7,7 +7,8 @@
  * the unit matrix, those of states whose rates do not hold themselves, are not stored.
  *
  * The tableau holds a by columns, then b, then d = b / a. With the states X at the stages, the state at the end of a
- * step is x + d (X - x), so that no product with A is needed.
+ * step is x + h b (A X + f). It is x + d (X - x) as well, without A, but X - x has lost digits, all the more in short
+ * steps, and what is lost adds up.
  */
 
 enum { STAGES = 4, BLOCK = STAGES * STAGES };
@@ -19,7 +20,7 @@ enum { STOPPED = -1, SINGULAR, SOLVED }; /* what the exported functions return *
 typedef struct {
   int states, blocks, entries;
   const int *pivot, *diagonal;           /* states in order of elimination, and their own blocks, UNIT without one */
-  const int *entry_block;                /* of each entry of A */
+  const int *entry_block, *entry_row, *entry_column;  /* of each entry of A */
   const int *left_start, *left_state, *left_block;    /* of each pivot's row: blocks eliminated before */
   const int *right_start, *right_state, *right_block; /* blocks that stay */
   const int *above_start, *above_state, *above_block; /* of each pivot's column: blocks that stay */
@@ -36,7 +37,9 @@ static Plan read_plan(const int *numbers) {
   p.pivot = numbers + 5;
   p.diagonal = p.pivot + p.states;
   p.entry_block = p.diagonal + p.states;
-  p.left_start = p.entry_block + p.entries;
+  p.entry_row = p.entry_block + p.entries;
+  p.entry_column = p.entry_row + p.entries;
+  p.left_start = p.entry_column + p.entries;
   p.left_state = p.left_start + p.states + 1;
   p.left_block = p.left_state + lower;
   p.right_start = p.left_block + lower;
@@ -239,29 +242,30 @@ EXPORT int collocation_forward(long steps, const int *plan, const double *h, con
                                double *factors, int kept, const double *f, double *x, double *stages, double *edges,
                                double *work, const volatile int *stop) {
   const Plan p = read_plan(plan);
-  const double *d = tableau + BLOCK + STAGES;
+  const double *b = tableau + BLOCK;
   const Square a = load_square(tableau);
   long step;
-  int i, r;
+  int i, k, r;
   memcpy(edges, x, p.states * sizeof(double));
   for (step = 0; step < steps; ++step) {
-    const double *force = f + step * STAGES * p.states;
+    const double *force = f + step * STAGES * p.states, *matrix = A + step * STAGES * p.entries;
     double *stage = stages + step * STAGES * p.states, *F = factors + (kept ? step * p.blocks * BLOCK : 0);
     if (*stop) return STOPPED;
-    if (!kept && !factorise(&p, h[step], A + step * STAGES * p.entries, tableau, F)) return SINGULAR;
+    if (!kept && !factorise(&p, h[step], matrix, tableau, F)) return SINGULAR;
     for (r = 0; r < p.states; ++r) {
       const double own[STAGES] = { force[r], force[p.states + r], force[2 * p.states + r], force[3 * p.states + r] };
       store_four(work + STAGES * r, x[r] + h[step] * times(a, own));
     }
     solve_step(&p, F, work);
-    for (r = 0; r < p.states; ++r) {
-      double change = 0.0;
-      for (i = 0; i < STAGES; ++i) {
-        stage[i * p.states + r] = work[STAGES * r + i];
-        change += d[i] * (work[STAGES * r + i] - x[r]);
-      }
-      x[r] += change;
+    for (r = 0; r < p.states; ++r)
+      for (i = 0; i < STAGES; ++i) stage[i * p.states + r] = work[STAGES * r + i];
+    memset(work, 0, p.states * sizeof(double));
+    for (i = 0; i < STAGES; ++i) {
+      const double *at = stage + i * p.states, *own = matrix + i * p.entries;
+      for (k = 0; k < p.entries; ++k) work[p.entry_row[k]] += b[i] * own[k] * at[p.entry_column[k]];
+      for (r = 0; r < p.states; ++r) work[r] += b[i] * force[i * p.states + r];
     }
+    for (r = 0; r < p.states; ++r) x[r] += h[step] * work[r];
     memcpy(edges + (step + 1) * p.states, x, p.states * sizeof(double));
   }
   return SOLVED;
@@ -269,20 +273,21 @@ EXPORT int collocation_forward(long steps, const int *plan, const double *h, con
 
 /* a' = -A' a - f from a at the end, which becomes a at the start; arguments as above.
  *
- * The discrete adjoint of the steps above: M' V = d a + h b f, then a + the sum of V, as d adds up to nothing. */
+ * The discrete adjoint of the steps above: M' V = d a + h b f, the adjoint at the stages a' V / b, at the start of the
+ * step a + h b (A' a' V / b + f). */
 EXPORT int collocation_backward(long steps, const int *plan, const double *h, const double *A, const double *tableau,
                                 double *factors, int kept, const double *f, double *a, double *stages, double *edges,
                                 double *work, const volatile int *stop) {
   const Plan p = read_plan(plan);
   const double *b = tableau + BLOCK, *d = b + STAGES;
   long step;
-  int i, r;
+  int i, k, r;
   memcpy(edges + steps * p.states, a, p.states * sizeof(double));
   for (step = steps - 1; step >= 0; --step) {
-    const double *force = f + step * STAGES * p.states;
+    const double *force = f + step * STAGES * p.states, *matrix = A + step * STAGES * p.entries;
     double *stage = stages + step * STAGES * p.states, *F = factors + (kept ? step * p.blocks * BLOCK : 0);
     if (*stop) return STOPPED;
-    if (!kept && !factorise(&p, h[step], A + step * STAGES * p.entries, tableau, F)) return SINGULAR;
+    if (!kept && !factorise(&p, h[step], matrix, tableau, F)) return SINGULAR;
     for (r = 0; r < p.states; ++r)
       for (i = 0; i < STAGES; ++i) work[STAGES * r + i] = d[i] * a[r] + h[step] * b[i] * force[i * p.states + r];
     solve_transposed_step(&p, F, work);
@@ -290,8 +295,14 @@ EXPORT int collocation_backward(long steps, const int *plan, const double *h, co
       const double *v = work + STAGES * r, *column = tableau;
       for (i = 0; i < STAGES; ++i, column += STAGES)
         stage[i * p.states + r] = ((column[0] * v[0] + column[1] * v[1]) + (column[2] * v[2] + column[3] * v[3])) / b[i];
-      a[r] += (v[0] + v[1]) + (v[2] + v[3]);
     }
+    memset(work, 0, p.states * sizeof(double));
+    for (i = 0; i < STAGES; ++i) {
+      const double *at = stage + i * p.states, *own = matrix + i * p.entries;
+      for (k = 0; k < p.entries; ++k) work[p.entry_column[k]] += b[i] * own[k] * at[p.entry_row[k]];
+      for (r = 0; r < p.states; ++r) work[r] += b[i] * force[i * p.states + r];
+    }
+    for (r = 0; r < p.states; ++r) a[r] += h[step] * work[r];
     memcpy(edges + step * p.states, a, p.states * sizeof(double));
   }
   return SOLVED;

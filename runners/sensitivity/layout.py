@@ -14,13 +14,16 @@ def stored_layout(found: xr.Dataset) -> xr.Dataset:
     """Return a sensitivity with one variable for each parameter, table and table's rows that has its own unit.
 
     ``derivative`` (parameter) becomes ``control_T1_gain_derivative`` and so on, ``table_derivative`` (table, t)
-    ``mass_table_derivative`` (t), ``knot_derivative`` (knot) ``mass_knot_derivative`` (mass_row). What is in percent
-    per percent stays over (parameter), (table) and (band).
+    ``mass_table_derivative`` (t), ``knot_derivative`` (knot) ``mass_knot_derivative`` (mass_row),
+    ``grouped_factor_derivative`` (grouped_factor) ``aerodynamics_grouped_factor_derivative``. What is in percent per
+    percent stays over (parameter), (table), (band) and (grouped_factor).
     """
     quantity = unit_by_rule("unit^2" if found.attrs["quantity"] == "variance" else "unit", {"unit": unit_of(found)})
     dims = {"parameter": found["parameter_unit"].values.tolist()}
     if "table" in found.dims:
         dims["table"] = found["table_unit"].values.tolist()
+    if "grouped_factor" in found.dims:
+        dims["grouped_factor"] = ["1"] * found.sizes["grouped_factor"]
     by_row = [name for name in found.variables if str(name).startswith(KNOTS)]
     stored = one_unit_a_variable(found.drop_vars(by_row), dims, {"quantity": quantity})
     for values in stored.data_vars.values():

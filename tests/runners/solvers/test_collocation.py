@@ -72,6 +72,15 @@ def test_order_eight(library):
     assert 200 < errors[0] / errors[1] < 320
 
 
+def test_short_steps_lose_no_digits(library):
+    """exp(-a t) by 20,000 steps: X - x has few digits there, and what a step loses, the next ones lose as well."""
+    rate, steps = 0.8, 20_000
+    grid, matrices = Grid(np.linspace(0.0, 1.0, steps + 1)), at_nodes(np.full((steps, STAGES, 1, 1), -rate))
+    ours, none = CompiledCollocation(grid, matrices, library), np.zeros((steps, STAGES, 1))
+    for edge in (ours.forward(np.ones(1), none)[1][-1], ours.backward(np.ones(1), none)[1][0]):
+        assert edge == pytest.approx(np.exp(-rate), rel=1e-13)
+
+
 @pytest.mark.parametrize("keep", [False, True])
 def test_a_pivot_that_vanishes_is_left_to_lapack(library, keep, caplog):
     """With roots 1 / (h b) of two states by themselves, b of the tableau, I - h a A is singular in these two."""

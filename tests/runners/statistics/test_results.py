@@ -100,6 +100,9 @@ def test_other_files_have_one_unit_a_variable(as504, tmp_path):
     gain = stored["reference_area_derivative"]
     assert gain.attrs["units"] == "N^2"  # (N m)^2 by m^2
     assert gain == sensitivity["derivative"].sel(parameter="reference_area")
+    grouped = stored["aerodynamics_grouped_factor_derivative"]
+    assert grouped.attrs["units"] == "N^2 m^2"
+    assert grouped == sensitivity["grouped_factor_derivative"].sel(grouped_factor="aerodynamics")
     mass = sensitivity.isel(knot=sensitivity["knot_table"].values == "mass")
     np.testing.assert_array_equal(stored["mass_knot_derivative"], mass["knot_derivative"])
     assert stored["mass_knot_derivative"].attrs["units"] == "N^2 m^2 kg^-1"
