@@ -13,6 +13,7 @@ from ascentwind.model import LinearSystem, define_system
 from ascentwind.model.errors import DirectNoiseError, ParameterValueError, TimeRangeError, UnknownNameError
 from ascentwind.runners import Study
 from ascentwind.runners.design.problem import LoadReliefProblem
+from ascentwind.runners.parameter_study import run_parameter_study
 from ascentwind.runners.sensitivity.check import central_difference
 from ascentwind.runners.sensitivity.one import UndefinedElasticityWarning
 from ascentwind.runners.sensitivity.request import StructuralParameterError, TableParameterError, ZeroQuantityError
@@ -296,10 +297,11 @@ def test_a_value_that_is_no_number_is_refused(as504, value):
         as504.with_parameters({"control.T1.gain": value})
 
 
-def test_nothing_follows_the_linear_mean_in_secret(cache):
-    """A vehicle that asks for the nonlinear mean is refused where only the linear one is known; studies know both."""
+def test_nothing_follows_the_linear_mean_in_secret(cache, tmp_path):
+    """A vehicle that asks for the nonlinear mean is refused where only the linear one is known."""
     study = Study.load("as504", changes={"options.mean_response": "nonlinear"})
     gain = "control.T1.gain"
+    plan = {"format": 1, "title": "t", "times": "30", "grid": {"quantity": [{"name": gain, "values": [1.0]}]}}
     for ask in (
         lambda: study.sensitivities(["bending_moment"], [30.0]),
         lambda: study.second_derivatives("bending_moment", 30.0, [gain]),
