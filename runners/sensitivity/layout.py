@@ -26,9 +26,6 @@ def stored_layout(found: xr.Dataset) -> xr.Dataset:
         dims["grouped_factor"] = ["1"] * found.sizes["grouped_factor"]
     by_row = [name for name in found.variables if str(name).startswith(KNOTS)]
     stored = one_unit_a_variable(found.drop_vars(by_row), dims, {"quantity": quantity})
-    for values in stored.data_vars.values():
-        if RULE in values.attrs and "units" not in values.attrs:  # over grouped factors, which have no unit
-            values.attrs["units"] = unit_by_rule(values.attrs[RULE], {"quantity": quantity})
     stored.attrs["quantity_unit"] = quantity
     return stored.assign(rows_of_tables(found, quantity)) if by_row else stored
 

@@ -85,7 +85,6 @@ def second_derivatives(
             "source": source,
             "quantity": quantity,
             "t2_s": at,
-            "steps": pair.flight.grid.steps.size,
             "value": request.value(pair.variance, pair.mean),
             "by_differences": ", ".join(names[k] for k in moving) or "none",
             "asymmetry": float(np.abs(hessian - hessian.T).max() / max(1e-300, np.abs(hessian).max())),

@@ -53,11 +53,10 @@ def closed(quantity: str) -> ca.Function:
 def test_closed_form(driven, quantity):
     d = driven.second_derivatives("y", TIME, list(AT), quantity=quantity)
     value, gradient, hessian = (np.array(x) for x in closed(quantity)(list(AT.values())))
-    assert d.attrs["value"] == pytest.approx(value.item(), rel=1e-10)
-    np.testing.assert_allclose(d["derivative"], gradient.ravel(), rtol=1e-9, atol=1e-12)
-    np.testing.assert_allclose(d["second_derivative"], hessian, rtol=1e-8, atol=1e-10)
-    # what is left is the rounding of sums over the grid, of a thousand steps and four nodes each
-    assert d.attrs["asymmetry"] < np.finfo(float).eps * 4 * d.attrs["steps"] * 10
+    assert d.attrs["value"] == pytest.approx(value.item(), rel=1e-13)
+    np.testing.assert_allclose(d["derivative"], gradient.ravel(), rtol=1e-12, atol=1e-13)
+    np.testing.assert_allclose(d["second_derivative"], hessian, rtol=1e-12, atol=1e-13)
+    assert d.attrs["asymmetry"] < 1e-13
 
 
 @pytest.mark.slow
