@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from .process import Grid, Steps
 
-NEVER = -50.0  # exponent of a bridge that does not count
+NEVER = -30.0  # exponent of a bridge that does not count
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,8 +61,8 @@ class Sightings:
         Paths.
     path, step : (k,) arrays of int
         Sorted by path, then by step.
-    begin, end : (k, r, 2) arrays
-        Values at the ends of the step, upper side first, with the sign that makes larger values worse.
+    begin, end : (k, r) arrays
+        Values at the ends of the step.
     variance : (k, r) array
         Of the bridge.
     turned : (k, r) array of bool
@@ -88,28 +88,23 @@ class Sightings:
 
     def passed(self, boundary: Boundary) -> NDArray[np.float64]:
         """Return the probability that each path passes a boundary, no nearer than the one looked at, (count,)."""
-        at_begin, at_end = self._gaps(boundary)
         survives = np.ones(self.count)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            exponent = -2.0 * at_begin * at_end / self.variance[:, :, None]
-        exponent = np.where((self.variance > 0)[:, :, None] & np.isfinite(at_begin), exponent, -np.inf)
-        exponent = np.where(self.turned[:, :, None], exponent[:, :, ::-1], exponent)
-        bridge = np.exp(np.minimum(exponent.max(axis=1, initial=-np.inf), 0.0))
-        np.multiply.at(survives, self.path, np.prod(1.0 - bridge, axis=1))
-        beyond = (np.minimum(at_begin, at_end) < 0).any(axis=(1, 2))
-        survives[self.path[beyond]] = 0.0
+        (up, above), (down, below) = (self._bridges(boundary, side) for side in (0, 1))
+        if self.turned.any():
+            up, down = np.where(self.turned, down, up), np.where(self.turned, up, down)
+        for exponent in (up, down):
+            np.multiply.at(survives, self.path, 1.0 - np.exp(_largest(exponent)))
+        survives[self.path[_any(above | below)]] = 0.0
         return 1.0 - survives
 
     def passed_by_output(self, boundary: Boundary) -> NDArray[np.float64]:
         """Return the same for every output by itself, (count, r)."""
-        at_begin, at_end = self._gaps(boundary)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            exponent = -2.0 * at_begin * at_end / self.variance[:, :, None]
-        exponent = np.where((self.variance > 0)[:, :, None] & np.isfinite(at_begin), exponent, -np.inf)
-        stays = np.prod(1.0 - np.exp(np.minimum(exponent, 0.0)), axis=2)
-        stays[(np.minimum(at_begin, at_end) < 0).any(axis=2)] = 0.0
         survives = np.ones((self.count, self.begin.shape[1]))
-        np.multiply.at(survives, self.path, stays)
+        for side in (0, 1):
+            exponent, beyond = self._bridges(boundary, side)
+            stays = 1.0 - np.exp(exponent)
+            stays = np.where(beyond, 0.0, stays)
+            np.multiply.at(survives, self.path, stays)
         return 1.0 - survives
 
     def worst(self, boundary: Boundary) -> tuple[NDArray[np.intp], ...]:
@@ -120,7 +115,8 @@ class Sightings:
         number, point, output, side : (k,) arrays of int
             Of the path, of the point of time, of the output; 0 on the upper side, 1 on the lower.
         """
-        gaps = np.stack(self._gaps(boundary), axis=1)  # (k, ends, r, sides)
+        sides = [np.stack(self._gaps(boundary, side), axis=1) for side in (0, 1)]
+        gaps = np.stack(sides, axis=3)  # (k, ends, r, sides)
         flat = gaps.reshape(len(gaps), -1)
         place = flat.argmin(axis=1)
         order = np.lexsort((flat[np.arange(place.size), place], self.path))
@@ -129,9 +125,32 @@ class Sightings:
         later, output, side = np.unravel_index(place[chosen], gaps.shape[1:])
         return numbers, self.step[chosen] + later, output, side
 
-    def _gaps(self, boundary: Boundary) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        bounds = np.stack([boundary.upper, -boundary.lower], axis=2)
-        return bounds[self.step] - self.begin, bounds[self.step + 1] - self.end
+    def _gaps(self, boundary: Boundary, side: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the distances to a boundary at both ends, (k, r), negative beyond it."""
+        if side == 0:
+            return boundary.upper[self.step] - self.begin, boundary.upper[self.step + 1] - self.end
+        return self.begin - boundary.lower[self.step], self.end - boundary.lower[self.step + 1]
+
+    def _bridges(self, boundary: Boundary, side: int) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        """Return ln of the probability that bridges pass on one side, and whether an end lies beyond, (k, r)."""
+        bound = boundary.upper if side == 0 else boundary.lower
+        if np.isinf(bound).all() and (bound > 0).all() == (side == 0):
+            return np.full(self.begin.shape, -np.inf), np.zeros(self.begin.shape, bool)
+        at_begin, at_end = self._gaps(boundary, side)
+        beyond = (at_begin < 0) | (at_end < 0)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            exponent = at_begin * at_end / (-0.5 * self.variance)
+        bridged = (self.variance > 0) & np.isfinite(at_begin)
+        return np.minimum(np.where(bridged, exponent, -np.inf), 0.0), beyond
+
+
+def _largest(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the largest value of every row; most often there is one."""
+    return values[:, 0] if values.shape[1] == 1 else values.max(axis=1, initial=-np.inf)
+
+
+def _any(values: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    return values[:, 0] if values.shape[1] == 1 else values.any(axis=1)
 
 
 def sightings(count: int, steps: Steps, boundary: Boundary, grid: Grid, every: int = 1) -> Sightings:
@@ -152,16 +171,43 @@ def sightings(count: int, steps: Steps, boundary: Boundary, grid: Grid, every: i
     variance = 0.5 * (diffusion[1:] ** 2 + diffusion[:-1] ** 2) * np.diff(times)[:, None]
     reach = np.sqrt(-0.5 * NEVER * variance)[steps.step]  # how near an end lies at least to where a bridge counts
     begin, end = mean[steps.step] + steps.begin, mean[steps.step + 1] + steps.end
-    close = (begin > seen.upper[steps.step] - reach) | (begin < seen.lower[steps.step] + reach)
-    close |= (end > seen.upper[steps.step + 1] - reach) | (end < seen.lower[steps.step + 1] + reach)
-    kept = np.flatnonzero(close.any(axis=1))
+    near = _near(steps, begin, end, seen.upper, reach) | _near(steps, -begin, -end, -seen.lower, reach)
+    kept = np.flatnonzero(_any(near))
     begin, end, step = begin[kept], end[kept], steps.step[kept]
     return Sightings(
         count,
         steps.path[kept],
         step,
-        np.stack([begin, -begin], axis=2),
-        np.stack([end, -end], axis=2),
+        begin,
+        end,
         variance[step],
         (diffusion[1:] < 0)[step],
     )
+
+
+def _near(
+    steps: Steps,
+    begin: NDArray[np.float64],
+    end: NDArray[np.float64],
+    bound: NDArray[np.float64],
+    reach: NDArray[np.float64],
+) -> NDArray[np.bool_]:
+    """Return which steps come within reach of a bound (m, r) and of where their path is farthest beyond it, (k, r).
+
+    At any other step the path does not pass the bound moved out, or passes it elsewhere too; moved out by the same
+    everywhere, or multiplied.
+    """
+    here, there = bound[steps.step], bound[steps.step + 1]
+    close = (begin > here - reach) | (end > there - reach)
+    if not np.isfinite(bound).all() or not close.any():
+        return close
+    first = np.flatnonzero(np.diff(steps.path, prepend=-1))
+    count = np.diff(first, append=steps.path.size)
+
+    def foremost(values: NDArray[np.float64], reach: NDArray[np.float64]) -> NDArray[np.bool_]:
+        return values >= np.repeat(np.maximum.reduceat(values, first, axis=0), count, axis=0) - reach
+
+    found = foremost(np.maximum(begin - here, end - there), reach)
+    if (bound > 0).all():
+        found |= foremost(np.maximum(begin / here, end / there), reach / np.minimum(here, there))
+    return close & found

@@ -183,6 +183,25 @@ def _paths_beyond(
     deviations += gain[:, None, None] * process.covariances(points, outputs)
     drawn = process.drawn.mean + deviations
     number = (drawn > inner.upper).sum(axis=(1, 2)) + (drawn < inner.lower).sum(axis=(1, 2))
-    close = inner.drawn_in(process.between)
-    near = np.any((drawn > close.upper) | (drawn < close.lower), axis=2)
+    outer, reach = boundary.at(slice(None, None, process.stride)), 2 * process.between
+    near = _may_be_first(drawn, outer.upper, reach) | _may_be_first(-drawn, -outer.lower, reach)
     return deviations, near, np.exp(log_sum - np.log(np.maximum(number, 1)))
+
+
+def _may_be_first(
+    drawn: NDArray[np.float64], bound: NDArray[np.float64], reach: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """Return where paths (count, m, r) may pass a bound (m, r) before they do elsewhere, as it moves out (count, m).
+
+    Moved by the same everywhere, or multiplied: a path that stays beyond it for long, such as one of a large bias,
+    needs to be looked at only where it goes farthest, and within reach of that.
+    """
+    close = drawn > bound - reach
+    if not close.any():
+        return close.any(axis=2)
+    beyond = drawn - bound
+    found = beyond >= beyond.max(axis=1, keepdims=True) - reach
+    if (bound > 0).all():
+        share = drawn / bound
+        found |= share >= share.max(axis=1, keepdims=True) - reach / bound
+    return np.any(close & found, axis=2)

@@ -47,7 +47,7 @@ ROADS = {"sweep": by_sweep, "exact steps": by_exact_steps}
 
 def between_times(chain: MarkovChain, output: int) -> np.ndarray:
     """R(t, s) of an output, all sources, one element after another."""
-    P, C, m = chain.covariance.sum(axis=1), chain.output[:, output], chain.times.size
+    P, C, m = chain.covariance(), chain.output[:, output], chain.times.size
     R = np.empty((m, m))
     for i in range(m):
         moved = P[i] @ C[i]
@@ -89,7 +89,7 @@ def test_covariance_between_times_has_its_closed_form(road, times):
 def test_discontinuities_are_kept_wherever_the_grid_lies(road, times):
     study = Study.from_system(switched_system())
     chain = ROADS[road](study, times)
-    variance = np.einsum("mi,msij,mj->m", chain.output[:, 0], chain.covariance, chain.output[:, 0])
+    variance = np.einsum("mi,mij,mj->m", chain.output[:, 0], chain.covariance(), chain.output[:, 0])
     expected = np.array([pieces(NOMINAL, time) for time in times])
     np.testing.assert_allclose(variance, expected[:, 0], rtol=1e-8, atol=1e-15)
     np.testing.assert_allclose(chain.mean[:, 0], expected[:, 1], rtol=1e-8, atol=1e-12)
@@ -110,17 +110,18 @@ def test_a_start_covariance_is_where_the_chain_begins():
     )
     for road in ROADS.values():
         chain = road(Study.from_system(system), [0.0, 1.0])
-        np.testing.assert_allclose(chain.covariance[0, 0, 0, 0], 2.0, rtol=1e-12)
+        np.testing.assert_allclose(chain.covariance()[0, 0, 0], 2.0, rtol=1e-12)
         stationary = 1 / (2 * RATE)
         expected = stationary + (2.0 - stationary) * np.exp(-2 * RATE)
-        np.testing.assert_allclose(chain.covariance[1, 0, 0, 0], expected, rtol=1e-8)
+        np.testing.assert_allclose(chain.covariance()[1, 0, 0], expected, rtol=1e-8)
 
 
 def test_a_part_of_a_chain_is_the_chain_over_its_times():
     whole = by_sweep(decaying(), np.linspace(2.0, 10.0, 17))
     part, points = whole.part(slice(5, 12)), slice(5, 12)
     np.testing.assert_array_equal(part.times, whole.times[points])
-    np.testing.assert_allclose(part.covariance, whole.covariance[points], rtol=1e-13)
+    for acting in (None, [0], [1]):
+        np.testing.assert_allclose(part.covariance(acting), whole.covariance(acting)[points], rtol=1e-13)
     np.testing.assert_allclose(between_times(part, 2), between_times(whole, 2)[points, points], rtol=1e-13)
     assert len(part.transition) == part.times.size - 1
 
@@ -132,7 +133,8 @@ def test_as504_by_both_roads(as504):
     chain = by_sweep(as504, times)
     names = as504.system.output_names
     found = as504.response_statistics(times[::10], responses=names, engine=Sweep(relative_tolerance=1e-9))
-    variance = np.einsum("mri,msij,mrj->mrs", chain.output, chain.covariance, chain.output)[::10]
+    by_source = [chain.covariance([k]) for k in range(len(as504.system.sources))]
+    variance = np.einsum("mri,smij,mrj->mrs", chain.output, by_source, chain.output)[::10]
     np.testing.assert_allclose(variance, found.variance.values[..., :-1], rtol=2e-9)
     errors = []
     for substep in (0.02, 0.01):
