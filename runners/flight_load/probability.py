@@ -172,7 +172,7 @@ def _solve(
         while excess(high) > 0:
             low, high = high, high + 2 * (high - low)
         value = _root(excess, low, high, SOLVED * step)
-    at_value, farther = excess(value), step
+    at_value, farther, slope = excess(value), step, 0.0
     for _ in range(2):  # over a step in which enough of the paths stop passing
         slope = (at_value - excess(value + farther)) / farther
         farther = SLOPE_STEP / slope if slope > 0 else 10 * farther
