@@ -18,7 +18,6 @@ from .flight_load.limit_table import Limits
 from .flight_load.limits import limit_passage
 from .flight_load.load import DESIGN, DRAWS, FlightLoad, flight_load
 from .flight_load.passage import Passage
-from .flight_load.request import Sides
 from .sensitivity.check import check_sensitivity
 from .sensitivity.many import sensitivities
 from .sensitivity.one import sensitivity
@@ -29,6 +28,7 @@ from .statistics.cvodes import Cvodes
 from .statistics.dataset import batch_dataset, with_members
 from .statistics.engine import Engine, Progress
 from .statistics.engines import engine_as, engine_of_options, find_engine, response_statistics
+from .statistics.percentiles import Sides
 from .statistics.results import ResponseStatistics
 from .statistics.sweep import Sweep
 from .statistics.weighting import weighting_dataset, weighting_family

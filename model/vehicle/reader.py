@@ -398,7 +398,14 @@ def _wind_record(entry: WindRecordEntry | None, toml: Path) -> WindRecord | None
         return None
     origin = WindOrigin(entry.site, entry.component, entry.period, entry.edition)
     try:
-        return WindRecord(origin, math.radians(entry.azimuth_deg), entry.sign, entry.held_above_m, entry.source)
+        return WindRecord(
+            origin,
+            math.radians(entry.azimuth_deg),
+            entry.sign,
+            entry.held_above_m,
+            entry.source,
+            entry.independent_samples,
+        )
     except DataError as error:
         raise DataError(error.why, file=toml, column="wind.record") from None
 

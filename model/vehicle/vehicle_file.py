@@ -211,6 +211,7 @@ class WindRecordEntry(Section):
     sign: Literal[1, -1]
     held_above_m: float
     source: str
+    independent_samples: Annotated[float, Field(gt=1)] | None = None
 
 
 class WindEntry(Section):

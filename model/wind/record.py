@@ -49,11 +49,15 @@ class WindRecord:
     held_above : float
         m; the statistics end there and their last values are held.
     source : str
+    independent_samples : float, optional
+        Soundings behind the statistics, reduced for their correlation from day to day, where that is known: what the
+        statistics' own sampling error follows from.
 
     Raises
     ------
     DataError
-        A component that blows along the flight path, a sign other than 1 and -1, numbers that are not finite.
+        A component that blows along the flight path, a sign other than 1 and -1, numbers that are not finite, one
+        independent sounding or less.
     """
 
     origin: WindOrigin
@@ -61,12 +65,19 @@ class WindRecord:
     sign: int
     held_above: float
     source: str
+    independent_samples: float | None = None
 
     def __post_init__(self):
         if self.sign not in (1, -1):
             raise DataError(f"the sign of a wind is {self.sign!r}; give 1 or -1")
         if not (math.isfinite(self.azimuth) and math.isfinite(self.held_above)):
             raise DataError("azimuth and highest altitude of a wind must be finite numbers")
+        samples = self.independent_samples
+        if samples is not None and not (samples > 1 and math.isfinite(samples)):
+            raise DataError(
+                f"a wind of {samples:g} independent soundings has no standard deviation; give a finite number above 1, "
+                "or leave independent_samples out"
+            )
         if self.share_across < SMALLEST_SHARE:
             other = next(c for c in COMPONENTS if c != self.origin.component)
             raise DataError(

@@ -35,8 +35,16 @@ def provenance(case: Case) -> dict[str, object]:
     }
     if case.vehicle:
         attributes["title"] = case.vehicle.title
+        if (samples := wind_samples(case)) is not None:
+            attributes["wind_independent_samples"] = samples
         attributes["tables"] = "; ".join(f"{s.file.name}: {s.status}" for s in case.vehicle.sources)
     return attributes
+
+
+def wind_samples(case: Case) -> float | None:
+    """Return the number of independent soundings behind a vehicle's wind; None where its record does not say."""
+    record = case.vehicle.wind.record if case.vehicle else None
+    return None if record is None else record.independent_samples
 
 
 def data_hash(case: Case) -> str:

@@ -13,17 +13,11 @@ from ...model.errors import UnknownNameError
 from ..case.case import Case
 from ..solvers.markov_chain import MarkovChain
 from ..station_loads.loads_along_vehicle import LOADS, SAME_STATION, load_rows
+from ..statistics.percentiles import Sides, checked_probabilities, checked_sides
 from .limit_table import LimitError, Limits
 from .passage import LimitedLoad, Passage
 from .process import ManyOutputs
-from .request import (
-    Sides,
-    UncheckedStationsWarning,
-    checked_draws,
-    checked_probabilities,
-    checked_sides,
-    refuse_without_variance,
-)
+from .request import UncheckedStationsWarning, checked_draws, refuse_without_variance
 from .window import checked_window, window_chain
 
 STEPS = 2400  # of the window; AS-504 in 60 s: 0.025 s

@@ -14,25 +14,26 @@ from scipy.special import ndtri_exp
 
 from ...model.errors import ParameterValueError
 from ..case.case import Case
-from ..case.provenance import provenance
-from ..statistics.percentiles import instant_level
+from ..case.provenance import provenance, wind_samples
+from ..statistics.percentiles import (
+    Sides,
+    checked_probabilities,
+    checked_sides,
+    instant_level,
+    monte_carlo_runs,
+)
+from ..statistics.sampling_interval import checked_samples
 from .crossings import Boundary, sightings
 from .limit_table import LimitError, Limits, limits_over_time
 from .passage import LimitedLoad, Passage
 from .pathwise import Movement, movement
 from .probability import Estimate, Level, estimate, find_level
 from .process import OneOutput
-from .request import (
-    Sides,
-    SpacingWarning,
-    checked_draws,
-    checked_probabilities,
-    checked_sides,
-    refuse_without_variance,
-)
+from .request import SpacingWarning, checked_draws, refuse_without_variance
 from .response import ResponseInWindow
 from .sampling import draw_beyond
 from .sensitivity import level_sensitivity
+from .wind_interval import wind_intervals
 from .window import checked_window
 
 DESIGN = 0.00135  # 1 - Phi(3): with this chance an instant passes mean + 3 sigma
@@ -42,6 +43,8 @@ SPACING_ERROR = 0.02  # relative, of a probability; finer where it is larger
 DRAWS = 2000
 MOVED = 8000  # draws of paths that just reach a level, of which derivatives are made
 BINS = 60  # of the time of the maximum
+SIDES = "upper", "lower"
+RUNS = "simulated flights without a failure that would say as much, at a consumer's risk of 10 %"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -120,6 +123,84 @@ class FlightLoad:
     def interval(self) -> xr.DataArray:
         """95 % interval of the level by its own sampling, (probability, bound)."""
         return self._array([found.interval for found in self.levels], "95 % interval by the sampling", ("bound",))
+
+    @cached_property
+    def side_shares(self) -> xr.DataArray:
+        """How the flights that pass each level fall on the two sides, (probability, side); they add up to one."""
+        found = np.array([level.draws.places(level.boundary).sum(axis=(0, 1)) for level in self.levels])
+        name = "share of the passing flights"
+        whole = self._array(found / found.sum(axis=1, keepdims=True), name, ("side",), "1")
+        return whole.assign_coords(side=list(SIDES))
+
+    @property
+    def side(self) -> list[str]:
+        """The side on which flights pass each level more often, 'upper' or 'lower', one a probability."""
+        return [SIDES[k] for k in self.side_shares.values.argmax(axis=1)]
+
+    @property
+    def wind_samples(self) -> float | None:
+        """Independent soundings behind the wind's statistics; None where its record does not say."""
+        return wind_samples(self.of.case)
+
+    def wind_interval(self, samples: float | None = None, confidence: float = 0.95) -> xr.DataArray:
+        """Return the interval of each level by the sampling error of the wind's statistics, (probability, bound).
+
+        Mean and spread of the wind's part, at the times and on the sides where flights pass the level and in their
+        shares, are those of N independent normal profiles; the level is the mean there and k sigma.
+        Errors at those times are taken as one, which is on the safe side, and the level moves as its envelope of
+        instants does. Without other sources the interval is that of the noncentral t distribution, with them by the
+        delta method (:func:`level_sampling_interval`).
+
+        Parameters
+        ----------
+        samples : float, optional
+            N; that of the wind's record without it.
+        confidence : float
+
+        Returns
+        -------
+        xarray.DataArray
+            In the unit of the response.
+
+        Raises
+        ------
+        ParameterValueError
+            N is not known, or not above one; a confidence that is none.
+        UnknownNameError
+            There is no source 'wind'.
+
+        Notes
+        -----
+        Nothing else is in it: not the filter's error, nor that of reconstructed correlations between altitudes, nor the
+        model's, nor the sampling of the paths (``interval``).
+        """
+        number = checked_samples(samples, self.wind_samples)
+        found = wind_intervals(self.of, self.process, self.levels, number, confidence)
+        name = f"{100 * confidence:g} % interval by {number:g} independent soundings of the wind"
+        return self._array(found, name, ("bound",)).assign_attrs(independent_samples=number, confidence=confidence)
+
+    def monte_carlo_runs(self, probability: float | None = None, risk: float = 0.10, failures: int = 0) -> int:
+        """Return the number of simulated flights that would say as much of a level.
+
+        With at most ``failures`` of so many flights beyond the level, its being passed more often than the probability
+        is accepted wrongly with a consumer's risk of ``risk``: order statistics (:func:`monte_carlo_runs`).
+
+        Parameters
+        ----------
+        probability : float, optional
+            A probability asked for; the first without it.
+        risk : float
+        failures : int
+
+        Returns
+        -------
+        int
+
+        Raises
+        ------
+        ParameterValueError
+        """
+        return monte_carlo_runs(self.probabilities[self.number_of(probability)], risk, failures)
 
     @property
     def spacing_error(self) -> xr.DataArray:
@@ -325,11 +406,15 @@ class FlightLoad:
             "flight_level_interval": self.interval,
             "spacing_error": self.spacing_error,
             "instant_level": self.instant_level,
+            "side_share": self.side_shares,
+            "monte_carlo_runs": self._array(map(self.monte_carlo_runs, self.probabilities), RUNS, unit="1"),
             "exceedance_level": ("point", curve["level"].values, units | {"long_name": "level"}),
             "exceedance": ("point", curve.values, curve.attrs),
             "exceedance_error": ("point", curve["standard_error"].values, curve["standard_error"].attrs),
             "time_of_maximum": self.time_of_maximum,
         }
+        if self.wind_samples is not None:
+            parts["wind_interval"] = self.wind_interval()
         found = xr.Dataset(parts).merge(self.shares)
         return found.assign_attrs(
             provenance(self.of.case)
@@ -350,7 +435,7 @@ class FlightLoad:
         self, values: Iterable[object], name: str, more: tuple[str, ...] = (), unit: str | None = None
     ) -> xr.DataArray:
         coords: dict = {"probability": ("probability", np.array(self.probabilities), {"units": "1"})}
-        if more:
+        if "bound" in more:
             coords["bound"] = ["lower", "upper"]
         attributes = {"units": unit or self.unit, "long_name": name}
         return xr.DataArray(np.array(list(values)), coords, ("probability", *more), attrs=attributes)

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from ..case.case import Case
 from ..case.provenance import provenance
-from ..statistics.percentiles import instant_level
+from ..statistics.percentiles import Sides, instant_level
 from .crossings import Boundary
 from .probability import Estimate, Level, estimate, find_level
 from .process import Process
-from .request import CertainPassageWarning, Sides
+from .request import CertainPassageWarning
 from .sampling import Draws, draw_beyond
 
 BINS = 60  # of the time of passing

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import TYPE_CHECKING
 
-from ...model.errors import AscentwindError, AscentwindWarning, ParameterValueError, UnknownNameError
+from ...model.errors import AscentwindError, AscentwindWarning, ParameterValueError
 
 if TYPE_CHECKING:
     from .process import Process
-
-Sides = Literal["both", "upper", "lower"]
 
 
 class NoVarianceError(AscentwindError):
@@ -27,46 +24,6 @@ class CertainPassageWarning(AscentwindWarning):
 
 class UncheckedStationsWarning(AscentwindWarning):
     """A limit over stations ends before the vehicle does, and what lies beyond it is not looked at."""
-
-
-def checked_probabilities(probabilities: float | Iterable[float]) -> tuple[float, ...]:
-    """Return probabilities as they are given.
-
-    Raises
-    ------
-    ParameterValueError
-        None is given, or one is not between 0 and 1.
-    """
-    given = [probabilities] if isinstance(probabilities, int | float) else probabilities
-    if isinstance(given, str) or not isinstance(given, Iterable):
-        raise ParameterValueError(f"{given!r} is no list of probabilities; give numbers, such as [0.00135]")
-    found = []
-    for p in given:
-        try:
-            value = float(p)
-        except (TypeError, ValueError):
-            raise ParameterValueError(f"{p!r} is not a probability; give a number between 0 and 1") from None
-        if not 0.0 < value < 1.0:
-            raise ParameterValueError(
-                f"a probability of {value:g} has no level; give one between 0 and 1, such as 0.00135"
-            )
-        found.append(value)
-    if not found:
-        raise ParameterValueError("no probability was given; 0.00135 is that of mean + 3 sigma at an instant")
-    return tuple(dict.fromkeys(found))
-
-
-def checked_sides(sides: str) -> Sides:
-    """Return the sides asked for.
-
-    Raises
-    ------
-    UnknownNameError
-    """
-    known: tuple[Sides, ...] = get_args(Sides)
-    if sides not in known:
-        raise UnknownNameError("choice of sides", str(sides), known)
-    return known[known.index(sides)]
 
 
 def checked_draws(draws: int, seed: int) -> None:

@@ -12,6 +12,7 @@ import xarray as xr
 from ...model.errors import DataError
 from ..present.files import write_whole
 from ..present.netcdf import joined, one_unit_a_variable, with_conventions, write_netcdf
+from .instant_levels import LEVEL
 
 NAME = "statistics.nc"
 COLUMNS = ("time_s", "response", "unit", "source", "mean", "variance", "std", "mean_plus_3sigma")
@@ -76,14 +77,17 @@ def statistics_csv(statistics: xr.Dataset) -> str:
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
     members = "member" in found.dims
-    writer.writerow(("member", *COLUMNS) if members else COLUMNS)
+    levels = [float(p) for p in found["probability"].values] if LEVEL in found else []
+    header = *COLUMNS, *(f"{LEVEL}_{p!r}" for p in levels)
+    writer.writerow(("member", *header) if members else header)
     for m in range(found.sizes["member"]) if members else (None,):
         part = found if m is None else found.isel(member=m)
-        values = {name: part[name].values for name in COLUMNS[4:]}
+        values = [part[name].values for name in COLUMNS[4:]]
+        values += [part[LEVEL].sel(probability=p).values for p in levels]
         for k, time in enumerate(part["time"].values):
             for r, response in enumerate(part["response"].values):
                 for s, source in enumerate(part["source"].values):
-                    numbers = (np.format_float_scientific(values[name][k, r, s], 9) for name in COLUMNS[4:])
+                    numbers = (np.format_float_scientific(column[k, r, s], 9) for column in values)
                     row = [f"{time:.12g}", response, part["unit"].values[r], source, *numbers]
                     writer.writerow(row if m is None else [m, *row])
     return buffer.getvalue()

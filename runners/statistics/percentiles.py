@@ -2,19 +2,60 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from collections.abc import Iterable
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import log_ndtr, ndtri_exp
 from scipy.stats import binom, chi2, nct
 
-from ...model.errors import ParameterValueError
+from ...model.errors import ParameterValueError, UnknownNameError
 
 Sides = Literal["both", "upper", "lower"]
 HALVINGS = 60
 MOST_RUNS = 10**9
 MOST_SAMPLES = 1e6  # for which the noncentral t is computed; beyond, the delta method is as good and does not fail
+
+
+def checked_probabilities(probabilities: float | Iterable[float]) -> tuple[float, ...]:
+    """Return probabilities as they are given.
+
+    Raises
+    ------
+    ParameterValueError
+        None is given, or one is not between 0 and 1.
+    """
+    given = [probabilities] if isinstance(probabilities, int | float) else probabilities
+    if isinstance(given, str) or not isinstance(given, Iterable):
+        raise ParameterValueError(f"{given!r} is no list of probabilities; give numbers, such as [0.00135]")
+    found = []
+    for p in given:
+        try:
+            value = float(p)
+        except (TypeError, ValueError):
+            raise ParameterValueError(f"{p!r} is not a probability; give a number between 0 and 1") from None
+        if not 0.0 < value < 1.0:
+            raise ParameterValueError(
+                f"a probability of {value:g} has no level; give one between 0 and 1, such as 0.00135"
+            )
+        found.append(value)
+    if not found:
+        raise ParameterValueError("no probability was given; 0.00135 is that of mean + 3 sigma at an instant")
+    return tuple(dict.fromkeys(found))
+
+
+def checked_sides(sides: str) -> Sides:
+    """Return the sides asked for.
+
+    Raises
+    ------
+    UnknownNameError
+    """
+    known: tuple[Sides, ...] = get_args(Sides)
+    if sides not in known:
+        raise UnknownNameError("choice of sides", str(sides), known)
+    return known[known.index(sides)]
 
 
 def instant_level(mean: ArrayLike, std: ArrayLike, probability: float, sides: Sides = "both") -> NDArray[np.float64]:
@@ -122,6 +163,8 @@ def level_sampling_interval(
         low, high = mean + wind_std * at / np.sqrt(samples)
         return float(low), float(high)
     total = np.hypot(wind_std, other_std)
+    if wind_std == 0:
+        return float(mean + sigmas * total), float(mean + sigmas * total)
     spread = wind_std * np.sqrt(1 / samples + (sigmas * wind_std / total) ** 2 / (2 * degrees))
     half = -float(ndtri_exp(np.log(0.5 * (1 - confidence)))) * spread
     level = mean + sigmas * total

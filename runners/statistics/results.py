@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,7 +17,11 @@ from ..present.files import prepare_folder
 from ..present.notebook import html_page, shortened
 from .dataset import QUANTITIES
 from .files import by_response, read_statistics, whole, write_statistics
+from .instant_levels import level_over_time, with_levels
+from .larger_side import SIGMAS
 from .peaks import Peak, peaks
+from .percentiles import Sides
+from .sampling_interval import SamplingInterval, instant_sampling_interval
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -134,6 +138,85 @@ class ResponseStatistics:
             Of a batch, or without all sources.
         """
         return peaks(self._one_table())
+
+    def percentile(self, probability: float, sides: Sides = "both", source: str = COMBINED) -> xr.DataArray:
+        """Return the level that responses pass with a probability at one instant, over (time, response).
+
+        Parameters
+        ----------
+        probability : float
+            Of being beyond the level, between 0 and 1: 0.01 asks for the 99th percentile; 0.00135 on one side is
+            mean + 3 sigma.
+        sides : {'both', 'upper', 'lower'}
+            Beyond in size, either side; upward; or downward, whose level is one of the negative response.
+        source : str
+            From which the response varies; its mean is the same from any.
+
+        Returns
+        -------
+        xarray.DataArray
+            In each response's ``unit``, with the coordinate ``side`` (time, response), the larger one for 'both'. The
+            attributes say which probability and sides.
+
+        Raises
+        ------
+        ParameterValueError, UnknownNameError
+        """
+        return level_over_time(self.dataset, probability, sides, source)
+
+    def with_percentiles(self, probabilities: Iterable[float]) -> ResponseStatistics:
+        """Return the statistics with a variable ``level`` (..., probability), which :meth:`save` writes too.
+
+        Parameters
+        ----------
+        probabilities : iterable of float
+            With which the response's size, on either side, is beyond the level at one instant.
+
+        Raises
+        ------
+        ParameterValueError
+        """
+        return ResponseStatistics(with_levels(self.dataset, probabilities))
+
+    def sampling_interval(
+        self,
+        response: str,
+        time: float,
+        samples: float | None = None,
+        confidence: float = 0.95,
+        sigmas: float = SIGMAS,
+    ) -> SamplingInterval:
+        """Return what the sampling error of the wind's statistics leaves open of a response at one time.
+
+        Parameters
+        ----------
+        response : str
+        time : float
+            One of the end times, s.
+        samples : float, optional
+            N, independent soundings behind the wind's mean and covariance; that of the wind's record without it.
+        confidence : float
+        sigmas : float
+            k, of the level |mean| + k sigma.
+
+        Returns
+        -------
+        SamplingInterval
+            Of sigma, by the wind and by all sources, and of the level. The wind's part of a variance is chi-square with
+            N - 1 degrees; that of other sources is taken as known (:func:`level_sampling_interval`).
+
+        Raises
+        ------
+        ParameterValueError
+            N is not known, or not above one; a confidence that is none; a batch.
+        UnknownNameError, TimeRangeError
+
+        Notes
+        -----
+        Nothing else is in it: not the filter's error, nor that of reconstructed correlations between altitudes, nor the
+        model's.
+        """
+        return instant_sampling_interval(self._one_table(), response, time, samples, confidence, sigmas)
 
     def plot(self, response: str, title: str | None = None) -> Figure:
         """Return the figure of a response over time: mean, and the larger side from the first source and from all.

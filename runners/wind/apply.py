@@ -28,7 +28,7 @@ from ..solvers.least_squares import FitOptions
 from .synthesis.result import SynthesisResult
 from .synthesis.synthesise import synthesise
 
-DECIMALS = 3  # of a table of soundings, m/s
+DECIMALS = 3  # of a table of soundings, m/s, and of their number
 AZIMUTH_TOLERANCE = 1e-6  # deg
 
 _HEADER = re.compile(r"""^\s*\[\[?\s*(?P<name>[A-Za-z0-9_."'-]+)\s*\]\]?\s*(#.*)?$""")
@@ -106,7 +106,9 @@ def apply_wind(
     OutputFolderError
     """
     assert statistics.origin is not None
-    record = WindRecord(statistics.origin, azimuth, sign, float(statistics.altitude[-1]), statistics.source)
+    samples = round(float(statistics.independent_samples), DECIMALS)
+    highest = float(statistics.altitude[-1])
+    record = WindRecord(statistics.origin, azimuth, sign, highest, statistics.source, samples)
     toml = folder / VEHICLE_FILE
     try:
         before = toml.read_text(encoding="utf-8")
@@ -194,6 +196,7 @@ def _wind_section(record: WindRecord, table: str, filter_file: str, command: str
             "sign": record.sign,
             "held_above_m": record.held_above,
             "source": record.source,
+            "independent_samples": record.independent_samples,
         },
     }
     lines = []
