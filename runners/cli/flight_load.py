@@ -8,15 +8,19 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.table import Table
 
-from ...model.errors import TimeRangeError, UnusedOptionError
+from ...model.errors import AscentwindError, TimeRangeError, UnusedOptionError
 from ...model.files.numbers import parse_number
-from ..present.terminal import console
+from ..present.terminal import console, errors
 from .job import Job, load_study, steps
 from .terminal import Changes, VehicleArgument, number, results_folder, whole
 
 SHOWN_LIMITS = 8
+SHOWN_PARAMETERS = 8
+ONE_SIDE = 0.995  # of the flights that pass, at least
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from ..flight_load.load import FlightLoad
     from ..flight_load.passage import Passage
 
@@ -36,6 +40,9 @@ def flight_load(
         typer.Option(help="CSV: 'time [s]', 'station [m]' or both, then limits such as 'bending_moment [N m]'."),
     ] = None,
     sides: Annotated[str, typer.Option(help="both, upper or lower.")] = "both",
+    sensitivity: Annotated[
+        bool, typer.Option("--sensitivity", help="Derivatives of the first level by parameters, ranked.")
+    ] = False,
     draws: Annotated[int, typer.Option(parser=whole, help="Paths of the importance sampling.")] = 2000,
     seed: Annotated[int, typer.Option(parser=whole, help="Of the draws.")] = 0,
     out: Annotated[Path | None, typer.Option(help="Folder for results; VEHICLE-flight-load without it.")] = None,
@@ -44,12 +51,12 @@ def flight_load(
     """The load of the whole flight: levels that its largest values pass, exceedance, limits and margins."""
     from ..flight_load.capability_figure import capability_figure
     from ..flight_load.exceedance_figure import exceedance_figure
-    from ..flight_load.files import write_flight_loads, write_passage
+    from ..flight_load.files import write_flight_loads, write_passage, write_sensitivities
     from ..flight_load.limit_table import Limits
     from ..flight_load.load import DESIGN
     from ..flight_load.margin_figure import margin_figure
-    from ..flight_load.request import checked_probabilities, checked_sides
     from ..present.style import words, write_figure
+    from ..statistics.percentiles import checked_probabilities, checked_sides
 
     asked, chosen = checked_probabilities(probability or [DESIGN]), checked_sides(sides)
     flown = None if window is None else parse_window(window)
@@ -92,6 +99,12 @@ def flight_load(
     print_loads(loads)
     if passage is not None:
         print_passage(passage)
+    if sensitivity:
+        found = _sensitivities(loads)
+        if found:
+            job.written.append(write_sensitivities(found, job.folder))
+        for part in found:
+            print_sensitivity(part)
     job.end()
 
 
@@ -117,16 +130,87 @@ def print_levels(loads: list[FlightLoad]) -> None:
     sides = {"both": "size", "upper": "upper side", "lower": "lower side"}[loads[0].sides]
     title = f"Largest values of a whole flight, {begin:g} to {end:g} s, {sides}"
     table = Table("response", title=title)
-    for column in ("chance", "level", "± 95 %", "worst instant", "ratio"):
+    for column in ("chance", "level", "side", "± 95 %", "worst instant", "ratio"):
         table.add_column(column, justify="right", no_wrap=True)
     for load in loads:
-        for p, found, instant in zip(load.probabilities, load.levels, load.instant_level.values, strict=True):
+        rows = zip(load.probabilities, load.levels, load.instant_level.values, load.side, strict=True)
+        for k, (p, found, instant, side) in enumerate(rows):
             factor, unit = display(load.unit, found.value)
+            share = float(load.side_shares[k].max())
             half = 0.5 * (found.interval[1] - found.interval[0])
             table.add_row(
-                words(load.response), f"{p:g}", f"{factor * found.value:.4g} {unit}", f"{factor * half:.2g}",
+                words(load.response), f"{p:g}", f"{factor * found.value:.4g} {unit}",
+                side if share > ONE_SIDE else f"{side} {100 * share:.0f} %", f"{factor * half:.2g}",
                 f"{factor * instant:.4g} {unit}", f"{found.value / instant:.3f}",
             )  # fmt: skip
+    console.print(table)
+
+
+def print_wind_intervals(loads: list[FlightLoad]) -> None:
+    """Print how well the wind's soundings know the levels, and how many simulated flights would say as much."""
+    from ..present.style import display, words
+
+    samples = loads[0].wind_samples
+    if samples is None:
+        console.print(
+            "How well the wind is known is not stated: give independent_samples in [wind.record] of vehicle.toml.",
+            style="dim", soft_wrap=True, markup=False,
+        )  # fmt: skip
+    else:
+        table = Table(
+            "response", title=f"95 % intervals of the levels by {samples:g} independent soundings of the wind"
+        )
+        for column in ("chance", "from", "to", "of the level"):
+            table.add_column(column, justify="right", no_wrap=True)
+        for load in loads:
+            for p, found, (low, high) in zip(load.probabilities, load.levels, load.wind_interval().values, strict=True):
+                factor, unit = display(load.unit, found.value)
+                relative = f"{100 * (low / found.value - 1):+.1f} % {100 * (high / found.value - 1):+.1f} %"
+                ends = (f"{factor * x:.4g} {unit}" for x in (low, high))
+                table.add_row(words(load.response), f"{p:g}", *ends, relative if found.value > 0 else "")
+        console.print(table)
+        console.print(
+            "By sampling of the wind alone: errors of its filter, of reconstructed correlations and of the model are not "
+            "in them.", style="dim", soft_wrap=True,
+        )  # fmt: skip
+    for p in loads[0].probabilities:
+        console.print(
+            f"{loads[0].monte_carlo_runs(p):,} simulated flights without a failure would say as much of {p:g}, at a "
+            "consumer's risk of 10 %.", highlight=False, soft_wrap=True,
+        )  # fmt: skip
+
+
+def _sensitivities(loads: list[FlightLoad]) -> list[xr.Dataset]:
+    """Return derivatives of the first levels; where one fails say so, so that what is written stands."""
+    from ..present.style import words
+
+    found = []
+    with steps("derivatives of the levels", len(loads)) as bar:
+        for load in loads:
+            try:
+                found.append(load.sensitivity())
+            except AscentwindError as error:
+                text = f"The derivatives of {load.response} could not be computed, all else stands: {error}"
+                errors.print(text, style="bold red", markup=False, highlight=False, soft_wrap=True)
+            bar.done(words(load.response))
+    return found
+
+
+def print_sensitivity(found: xr.Dataset) -> None:
+    """Print the parameters that a level owes most to."""
+    from ..present.style import display, words
+
+    a = found.attrs
+    factor, unit = display(a["unit"], a["level"])
+    title = f"What drives the level of {words(a['response'])} passed with {a['probability']:g}: "
+    table = Table("parameter", title=f"{title}{factor * a['level']:.4g} {unit}")
+    for column in ("value", "% per %", f"derivative ({a['unit']} per unit)"):
+        table.add_column(column, justify="right", no_wrap=True)
+    for k, name in enumerate(found["parameter"].values[:SHOWN_PARAMETERS]):
+        value = f"{float(found['parameter_value'][k]):.5g} {found['parameter_unit'].values[k]}".removesuffix(" 1")
+        table.add_row(
+            str(name), value, f"{float(found['elasticity'][k]):+.4f}", f"{float(found['derivative'][k]):+.4g}"
+        )
     console.print(table)
 
 
@@ -135,6 +219,7 @@ def print_loads(loads: list[FlightLoad]) -> None:
     from ..present.style import words
 
     print_levels(loads)
+    print_wind_intervals(loads)
     table = Table("response", title="Shares of the sources where the level is reached")
     for source in loads[0].of.case.system.sources:
         table.add_column(words(source), justify="right")

@@ -32,6 +32,12 @@ def run(
     tolerance: Annotated[
         float | None, typer.Option(parser=number, help="Relative tolerance of the integration.")
     ] = None,
+    probability: Annotated[
+        list[float] | None,
+        typer.Option(
+            parser=number, help="Level passed with this chance besides, at an instant and in a flight; several times."
+        ),
+    ] = None,
     changes: Changes = None,
     along_vehicle: Annotated[
         str | None,
@@ -45,13 +51,16 @@ def run(
     from ...model.equations.stated_twice import compare_stated_twice
     from ..case.times import parse_times
     from ..flight_load.files import with_flight_levels
+    from ..flight_load.load import DESIGN
     from ..present.style import words, write_figure
     from ..statistics.engines import engine_from
     from ..statistics.larger_side import LABEL
     from ..statistics.peak_check import weighting_at, with_peak_check
+    from ..statistics.percentiles import checked_probabilities
     from ..statistics.response_figures import weighting_figure
     from ..views.along_vehicle_files import prepare_along_vehicle, write_along_vehicle
 
+    chances = checked_probabilities(probability) if probability else ()
     settings = {"method": method, "relative_tolerance": tolerance}
     engine_from(engine, **settings)  # refused before anything is computed
     if times and "default_times" in parse_changes(changes or []):
@@ -69,6 +78,8 @@ def run(
         statistics = study.response_statistics(
             end_times, engine=chosen, progress=lambda t: bar.done(f"end time {t:g} s")
         )
+    if chances:
+        statistics = statistics.with_percentiles(chances)
     job.replace_earlier("run", study.system.name)
     job.written += statistics.save(job.folder)
     with console.status("peaks again by another road"):
@@ -77,7 +88,7 @@ def run(
         statistics = with_peak_check(statistics, check, study)
         statistics.save(job.folder)
         families = sorted({*families, *(p.time for p in check.peaks[:1] if p.time > study.system.start)})
-    loads = _flight_loads(study, end_times)
+    loads = _flight_loads(study, end_times, (DESIGN, *chances))
     if loads:
         statistics = with_flight_levels(statistics, loads)
         statistics.save(job.folder)
@@ -100,6 +111,8 @@ def run(
         with console.status("loads along the vehicle"):
             job.written += write_along_vehicle(study, end_times, moment_time, job.folder)
     _print_peaks(statistics)
+    for chance in chances:
+        _print_instant_levels(statistics, chance)
     if loads:
         print_levels(loads)
     top = flown.wind.mean.argument[-1]
@@ -127,7 +140,7 @@ def _check_peaks(study: Study, statistics: ResponseStatistics) -> PeakCheck | No
         return None
 
 
-def _flight_loads(study: Study, end_times: list[float]) -> list[FlightLoad]:
+def _flight_loads(study: Study, end_times: list[float], probabilities: tuple[float, ...]) -> list[FlightLoad]:
     """Return the flight's load of every response between the first and the last end time; where it fails say so."""
     from ..flight_load.request import NoVarianceError
 
@@ -137,7 +150,7 @@ def _flight_loads(study: Study, end_times: list[float]) -> list[FlightLoad]:
     with steps("loads of the flight", len(study.system.outputs)) as bar:
         for output in study.system.outputs:
             try:
-                loads.append(study.flight_load(output.name, (end_times[0], end_times[-1])))
+                loads.append(study.flight_load(output.name, (end_times[0], end_times[-1]), probabilities))
                 _ = loads[-1].levels
             except NoVarianceError:
                 pass
@@ -170,3 +183,21 @@ def _print_peaks(statistics: ResponseStatistics) -> None:
     at_end = any(peak.at_end for peak in found)
     if at_end:
         console.print("* on the first or last end time asked for; the peak of the flight may lie beyond", style="dim")
+
+
+def _print_instant_levels(statistics: ResponseStatistics, probability: float) -> None:
+    from ..present.style import display, words
+
+    found = statistics.percentile(probability)
+    table = Table(
+        "response", title=f"Largest level that the size of a response passes with {probability:g} at an instant"
+    )
+    for column in ("time", "level", "larger side"):
+        table.add_column(column, justify="right", no_wrap=True)
+    for name in found["response"].values:
+        at = found.sel(response=name)
+        at = at.isel(time=int(at.argmax()))
+        factor, unit = display(str(at["unit"].item()), float(at))
+        time = f"{float(at['time']):g} s"
+        table.add_row(words(str(name)), time, f"{factor * float(at):.4g} {unit}", str(at["side"].item()))
+    console.print(table)

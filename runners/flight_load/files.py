@@ -17,7 +17,9 @@ from .load import FlightLoad
 from .passage import Passage
 
 CSV_EVERY = 20  # points of the grid of times in limits.csv
-LEVELS = ("flight_level", "flight_level_interval", "instant_level", "exceedance_level", "level_without")
+LEVELS = (
+    "flight_level", "flight_level_interval", "instant_level", "exceedance_level", "level_without", "wind_interval",
+)  # fmt: skip
 
 
 def write_flight_loads(loads: Sequence[FlightLoad], folder: Path) -> list[Path]:
@@ -49,7 +51,7 @@ def flight_dataset(loads: Sequence[FlightLoad]) -> xr.Dataset:
     parts = []
     for load in loads:
         part = load.to_dataset()
-        for name in LEVELS:
+        for name in part.data_vars.keys() & set(LEVELS):
             part[name].attrs = {RULE: "response", "long_name": part[name].attrs["long_name"]}
         if load.limits is not None and load.response in load.limits.values:
             passed, left = load.passage.probability, load.passage
@@ -88,6 +90,33 @@ def with_flight_levels(statistics: ResponseStatistics, loads: Sequence[FlightLoa
     return ResponseStatistics(statistics.dataset.assign(variables).assign_attrs(flight_level_window_s=window))
 
 
+def write_sensitivities(found: Sequence[xr.Dataset], folder: Path) -> Path:
+    """Write flight_load_sensitivity.csv, a row a response and parameter, the largest first.
+
+    Parameters
+    ----------
+    found : sequence of xarray.Dataset
+        Of :meth:`FlightLoad.sensitivity`.
+    folder : Path
+
+    Raises
+    ------
+    OutputFolderError
+    """
+    numbers = ("derivative", "elasticity", "envelope_elasticity")
+    rows: list[Sequence[object]] = [
+        ("response", "unit", "probability", "level", "parameter", "parameter_unit", "parameter_value", *numbers)
+    ]
+    for part in found:
+        a = part.attrs
+        for k, name in enumerate(part["parameter"].values):
+            of = str(name), str(part["parameter_unit"].values[k]), f"{float(part['parameter_value'][k]):.9g}"
+            values = (f"{float(part[n][k]):.9e}" for n in numbers)
+            rows.append((a["response"], a["unit"], f"{a['probability']:g}", f"{a['level']:.9e}", *of, *values))
+    text = _csv(rows)
+    return write_whole(folder / "flight_load_sensitivity.csv", lambda p: p.write_text(text, encoding="utf-8"))
+
+
 def write_passage(passage: Passage, folder: Path) -> list[Path]:
     """Write limits.nc, of which each load's variables have their own unit, and limits.csv, a row a load and time.
 
@@ -122,13 +151,21 @@ def write_passage(passage: Passage, folder: Path) -> list[Path]:
 def _levels_csv(loads: Sequence[FlightLoad]) -> str:
     header = (
         "response", "unit", "sides", "window_begin_s", "window_end_s", "probability", "flight_level", "lower_95",
-        "upper_95", "spacing_error", "instant_level",
+        "upper_95", "spacing_error", "instant_level", "side", "side_share", "wind_lower_95", "wind_upper_95",
+        "independent_samples", "monte_carlo_runs",
     )  # fmt: skip
     rows: list[Sequence[object]] = [header]
     for load in loads:
-        for p, found, instant in zip(load.probabilities, load.levels, load.instant_level.values, strict=True):
-            numbers = found.value, *found.interval, found.probability.spacing_error, instant
-            rows.append((load.response, load.unit, load.sides, *load.window, f"{p:g}", *(f"{x:.9e}" for x in numbers)))
+        known = load.wind_samples is not None
+        by_wind = load.wind_interval().values if known else []
+        for k, (p, found) in enumerate(zip(load.probabilities, load.levels, strict=True)):
+            numbers = found.value, *found.interval, found.probability.spacing_error, float(load.instant_level[k])
+            share = f"{float(load.side_shares[k].max()):.6g}"
+            wind = [f"{x:.9e}" for x in by_wind[k]] + [f"{load.wind_samples:g}"] if known else [""] * 3
+            rows.append(
+                (load.response, load.unit, load.sides, *load.window, f"{p:g}", *(f"{x:.9e}" for x in numbers),
+                 load.side[k], share, *wind, load.monte_carlo_runs(p))
+            )  # fmt: skip
     return _csv(rows)
 
 

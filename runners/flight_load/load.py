@@ -407,7 +407,9 @@ class FlightLoad:
             "spacing_error": self.spacing_error,
             "instant_level": self.instant_level,
             "side_share": self.side_shares,
-            "monte_carlo_runs": self._array(map(self.monte_carlo_runs, self.probabilities), RUNS, unit="1"),
+            "monte_carlo_runs": self._array(
+                [float(self.monte_carlo_runs(p)) for p in self.probabilities], RUNS, (), "1"
+            ),
             "exceedance_level": ("point", curve["level"].values, units | {"long_name": "level"}),
             "exceedance": ("point", curve.values, curve.attrs),
             "exceedance_error": ("point", curve["standard_error"].values, curve["standard_error"].attrs),

@@ -72,7 +72,7 @@ def level_sensitivity(
             "parameter_unit": ("parameter", [known[name].unit for name in order]),
             "parameter_value": ("parameter", at),
         },
-        provenance(of.case) | {"response": of.response, "level": level.value, "times_s": times},
+        provenance(of.case) | {"response": of.response, "unit": of.unit, "level": level.value, "times_s": times},
     )
 
 
