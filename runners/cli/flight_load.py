@@ -170,8 +170,8 @@ def print_wind_intervals(loads: list[FlightLoad]) -> None:
                 table.add_row(words(load.response), f"{p:g}", *ends, relative if found.value > 0 else "")
         console.print(table)
         console.print(
-            "By sampling of the wind alone: errors of its filter, of reconstructed correlations and of the model are not "
-            "in them.", style="dim", soft_wrap=True,
+            "By sampling of the wind alone: errors of its filter, of reconstructed correlations and of the model are "
+            "not in them.", style="dim", soft_wrap=True,
         )  # fmt: skip
     for p in loads[0].probabilities:
         console.print(

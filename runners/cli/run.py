@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from ..statistics.peak_check import PeakCheck
     from ..statistics.results import ResponseStatistics
     from ..study import Study
+    from ..views.along_vehicle_files import LargestAlong
 
 
 def run(
@@ -107,14 +108,18 @@ def run(
             figure = weighting_figure(weighting, first.name, first.unit, title)
             job.written += write_figure(figure, job.folder, "weighting_functions")
         bar.done()
+    along: list[LargestAlong] = []
     if along_vehicle is not None:
         with console.status("loads along the vehicle"):
-            job.written += write_along_vehicle(study, end_times, moment_time, job.folder)
+            files, along = write_along_vehicle(study, end_times, moment_time, job.folder)
+            job.written += files
     _print_peaks(statistics)
     for chance in chances:
         _print_instant_levels(statistics, chance)
     if loads:
         print_levels(loads)
+    if along:
+        _print_along(along)
     top = flown.wind.mean.argument[-1]
     if study.tables(end_times[-1])["altitude"] > top:
         console.print(f"Above {top / 1000:g} km the wind tables end and their last values are held.", style="dim")
@@ -200,4 +205,18 @@ def _print_instant_levels(statistics: ResponseStatistics, probability: float) ->
         factor, unit = display(str(at["unit"].item()), float(at))
         time = f"{float(at['time']):g} s"
         table.add_row(words(str(name)), time, f"{factor * float(at):.4g} {unit}", str(at["side"].item()))
+    console.print(table)
+
+
+def _print_along(found: list[LargestAlong]) -> None:
+    from ..present.style import display, words
+    from ..statistics.larger_side import LABEL
+
+    table = Table("load", title=f"Largest {LABEL} along the vehicle")
+    for column in (LABEL, "side", "station", "time"):
+        table.add_column(column, justify="right", no_wrap=True)
+    for load in found:
+        factor, unit = display(load.unit, load.value)
+        value = f"{factor * load.value:.4g} {unit}"
+        table.add_row(words(load.load), value, load.side, f"{load.station:.4g} m", f"{load.time:g} s")
     console.print(table)

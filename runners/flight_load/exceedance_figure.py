@@ -46,6 +46,8 @@ def exceedance_figure(load: FlightLoad, title: str) -> Figure:
         width = float(density["time"][1] - density["time"][0])
         below.step(density["time"], density[0], where="mid", color=COLORS["mean"], label="any flight")
         name = f"flights that pass {factor * float(load.level[0]):.4g} {unit}"
+        if load.sides == "both":
+            name += f", {100 * float(load.side_shares[0].max()):.3g} % on the {load.side[0]} side"
         below.fill_between(density["time"], density[1], step="mid", color=MAXIMUM, alpha=0.35, lw=0, label=name)
         below.set(
             xlabel=f"flight time of the largest value (s), in bins of {width:.3g} s",

@@ -148,14 +148,16 @@ class FlightLoad:
         Mean and spread of the wind's part, at the times and on the sides where flights pass the level and in their
         shares, are those of N independent normal profiles; the level is the mean there and k sigma.
         Errors at those times are taken as one, which is on the safe side, and the level moves as its envelope of
-        instants does. Without other sources the interval is that of the noncentral t distribution, with them by the
-        delta method (:func:`level_sampling_interval`).
+        instants does; other sources' sigmas are taken as known, although noises that multiply the mean move with it.
+        Without other sources the interval is that of the noncentral t distribution, with them by the delta method
+        (:func:`level_sampling_interval`).
 
         Parameters
         ----------
         samples : float, optional
             N; that of the wind's record without it.
         confidence : float
+            Share of such intervals that hold the true level.
 
         Returns
         -------
@@ -190,6 +192,7 @@ class FlightLoad:
         probability : float, optional
             A probability asked for; the first without it.
         risk : float
+            Probability of accepting the level wrongly.
         failures : int
 
         Returns

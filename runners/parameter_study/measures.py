@@ -23,7 +23,8 @@ def measures(result: ParameterStudy) -> xr.Dataset:
     xarray.Dataset
         ``sample`` (measure, response, computed_member) and ``nominal`` (measure, response), SI; ``peak_time``
         (response), the end time of the nominal peak, at which all measures but 'peak' are taken; ``member_peak_time``
-        (response, computed_member); the coordinate ``member`` is the number of a member in the study.
+        and ``member_peak_side`` (response, computed_member); the coordinate ``member`` is the number of a member in the
+        study.
     """
     data, kept = result.data, result.computed
     mean, std = (data[name].values[kept] for name in ("mean", "std"))
@@ -32,6 +33,9 @@ def measures(result: ParameterStudy) -> xr.Dataset:
     at = np.argmax(larger_side(nominal_mean, nominal_std), axis=0)
     responses = np.arange(at.size)
     samples = _measures(mean, std, at)
+    peak = np.argmax(larger_side(mean, std), axis=1)  # (members, responses)
+    mean_there = np.take_along_axis(mean, peak[:, None], axis=1)[:, 0]
+    sides = np.array([[side(value) for value in row] for row in mean_there], str).reshape(peak.shape)
     return xr.Dataset(
         {
             "sample": (("measure", "response", "computed_member"), np.moveaxis(samples, 0, -1)),
@@ -39,9 +43,10 @@ def measures(result: ParameterStudy) -> xr.Dataset:
             "peak_time": ("response", data["time"].values[at], {"units": "s"}),
             "member_peak_time": (
                 ("response", "computed_member"),
-                data["time"].values[np.argmax(larger_side(mean, std), axis=1)].T.reshape(responses.size, -1),
+                data["time"].values[peak].T.reshape(responses.size, -1),
                 {"units": "s"},
             ),
+            "member_peak_side": (("response", "computed_member"), sides.T),
         },
         {
             "measure": list(MEASURES),

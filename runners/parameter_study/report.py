@@ -78,16 +78,18 @@ def member_rows(result: ParameterStudy, measured: xr.Dataset) -> list[list[str]]
     data, responses = result.data, _names(measured, "response")
     head = ["member", *(f"{q.name} ({q.unit})" for q in result.quantities), "status", "reason"]
     for response, unit in zip(responses, _names(measured, "unit"), strict=True):
-        head += [f"peak |mean| + 3 sigma of {response} ({unit})", f"at (s), {response}"]
+        head += [f"peak |mean| + 3 sigma of {response} ({unit})", f"at (s), {response}", f"side, {response}"]
     rows = [head]
     column = {int(m): i for i, m in enumerate(measured["member"].values)}
     peak, time = measured["sample"].sel(measure=PEAK).values, measured["member_peak_time"].values
+    sides = measured["member_peak_side"].values
     for m, (row, status, reason) in enumerate(
         zip(data["value"].values, data["status"].values, data["reason"].values, strict=True)
     ):
         cells = [str(m), *map(_number, row), STATUS[status], str(reason)]
         for r in range(len(responses)):
-            cells += [_number(peak[r, column[m]]), _number(time[r, column[m]])] if m in column else ["", ""]
+            at = r, column.get(m, 0)
+            cells += [_number(peak[at]), _number(time[at]), str(sides[at])] if m in column else [""] * 3
         rows.append(cells)
     return rows
 

@@ -206,7 +206,7 @@ def monte_carlo_runs(probability: float, risk: float = 0.10, failures: int = 0) 
     if not (np.isfinite(failures) and failures >= 0 and failures == int(failures)):
         raise ParameterValueError(f"{failures} failures cannot be counted; give a whole number of 0 or more")
     if failures == 0:
-        runs = np.log(risk) / np.log1p(-probability)  # (1 - p)^n <= risk
+        runs = float(np.log(risk)) / float(np.log1p(-probability))  # (1 - p)^n <= risk
         if not np.isfinite(runs):
             raise ParameterValueError(f"a probability of {probability:g} asks for more runs than can be counted")
         return int(np.ceil(runs))

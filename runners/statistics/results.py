@@ -145,8 +145,8 @@ class ResponseStatistics:
         Parameters
         ----------
         probability : float
-            Of being beyond the level, between 0 and 1: 0.01 asks for the 99th percentile; 0.00135 on one side is
-            mean + 3 sigma.
+            Probability of being beyond the level, between 0 and 1: 0.01 asks for the 99th percentile; 0.00135 on one
+            side is mean + 3 sigma.
         sides : {'both', 'upper', 'lower'}
             Beyond in size, either side; upward; or downward, whose level is one of the negative response.
         source : str
@@ -170,7 +170,11 @@ class ResponseStatistics:
         Parameters
         ----------
         probabilities : iterable of float
-            With which the response's size, on either side, is beyond the level at one instant.
+            Each a probability with which the response's size, on either side, is beyond the level at one instant.
+
+        Returns
+        -------
+        ResponseStatistics
 
         Raises
         ------
@@ -196,8 +200,9 @@ class ResponseStatistics:
         samples : float, optional
             N, independent soundings behind the wind's mean and covariance; that of the wind's record without it.
         confidence : float
+            Share of such intervals that hold the true value.
         sigmas : float
-            k, of the level |mean| + k sigma.
+            k, of the level |mean| + k sigma: a factor.
 
         Returns
         -------

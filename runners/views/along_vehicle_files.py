@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,13 +24,47 @@ from ..present.files import write_whole
 from ..present.netcdf import write_netcdf
 from ..present.style import COLORS, STYLE, display, words, write_figure
 from ..station_loads.loads_along_vehicle import LOADS, every_load_along_vehicle, known_loads
-from ..statistics.larger_side import LABEL, larger_side
+from ..statistics.larger_side import LABEL, larger_side, side
 
 if TYPE_CHECKING:
     from ..study import Study
 
 PEAK = "peak"
 COLUMNS = ("time_s", "station_m", "source", "mean", "std", "mean_plus_3sigma")
+
+
+@dataclass(frozen=True)
+class LargestAlong:
+    """The largest |mean| + 3 sigma of a load along the vehicle, over all times.
+
+    Attributes
+    ----------
+    load, unit : str
+    value, mean : float
+        SI; the mean there with its sign.
+    station, time : float
+        m, s.
+    """
+
+    load: str
+    unit: str
+    value: float
+    mean: float
+    station: float
+    time: float
+
+    @staticmethod
+    def of(found: xr.Dataset) -> LargestAlong:
+        """Return that of a load over (time, station)."""
+        size, load = _largest(found).values, found.attrs["load"]
+        k, n = np.unravel_index(np.argmax(size), size.shape)
+        at = found["mean"].values[k, n], found["station"].values[n], found["time"].values[k]
+        return LargestAlong(load, LOADS[load], float(size[k, n]), *map(float, at))
+
+    @property
+    def side(self) -> str:
+        """Name of the side on which it lies."""
+        return side(self.mean)
 
 
 def prepare_along_vehicle(study: Study, text: str) -> float | None:
@@ -51,7 +86,9 @@ def prepare_along_vehicle(study: Study, text: str) -> float | None:
     return time
 
 
-def write_along_vehicle(study: Study, times: list[float], time: float | None, folder: Path) -> list[Path]:
+def write_along_vehicle(
+    study: Study, times: list[float], time: float | None, folder: Path
+) -> tuple[list[Path], list[LargestAlong]]:
     """Compute the loads along the vehicle at all times, and write NetCDF, CSV and a figure of each.
 
     Parameters
@@ -62,12 +99,16 @@ def write_along_vehicle(study: Study, times: list[float], time: float | None, fo
         Of the section through the vehicle; None takes the time of the largest bending moment.
     folder : Path
         Made and writable.
+
+    Returns
+    -------
+    list of Path, list of LargestAlong
+        Files, and the largest of each load.
     """
     vehicle = study.vehicle_for("the bending moment along the vehicle")
     every = every_load_along_vehicle(study, sorted({*times, *([] if time is None else [time])}), known_loads(vehicle))
     if time is None:
-        largest = _largest(every[0]).max("station")
-        time = float(every[0]["time"].values[int(np.argmax(largest.values))])
+        time = LargestAlong.of(every[0]).time
     written = []
     for found in every:
         name, text = f"{found.attrs['load']}_along_vehicle", along_csv(found)
@@ -76,7 +117,7 @@ def write_along_vehicle(study: Study, times: list[float], time: float | None, fo
             write_whole(folder / f"{name}.csv", lambda p, text=text: p.write_text(text, encoding="utf-8")),
             *write_figure(along_figure(found, time, vehicle), folder, name),
         ]
-    return written
+    return written, [LargestAlong.of(found) for found in every]
 
 
 def along_csv(found: xr.Dataset) -> str:
@@ -104,11 +145,13 @@ def along_figure(found: xr.Dataset, time: float, vehicle: Vehicle) -> Figure:
         outline, *axes = figure.subplots(1 + panels, sharex=True, height_ratios=[0.18, *[1] * panels])
         _tanks(outline, vehicle.folder)
         _section(axes[0], found.sel(time=time), factor)
-        axes[0].set_title(f"at {time:g} s", loc="left")
+        axes[0].set_title(f"at {time:g} s, {_told(LargestAlong.of(found.sel(time=[time])))}", loc="left")
         if panels > 1:
             _envelope(axes[1], found, factor)
             begin, end = found["time"].values[[0, -1]]
-            axes[1].set_title(f"envelope from {begin:g} to {end:g} s", loc="left")
+            largest = LargestAlong.of(found)
+            over = f"from {begin:g} to {end:g} s, {_told(largest)}, {largest.time:g} s"
+            axes[1].set_title(over, loc="left")
             mesh = axes[2].pcolormesh(
                 found["station"], found["time"], factor * _largest(found), shading="gouraud", rasterized=True
             )
@@ -161,6 +204,11 @@ def _envelope(axes: Axes, found: xr.Dataset, factor: float) -> None:
     axes.plot(found["station"], factor * low, "--", color=COLORS[COMBINED], lw=1.8, label="least mean - 3σ")
     for edge, label in ((mean.max("time"), "largest and least mean"), (mean.min("time"), None)):
         axes.plot(found["station"], factor * edge, color=COLORS["mean"], lw=1.5, label=label)
+
+
+def _told(largest: LargestAlong) -> str:
+    factor, unit = display(largest.unit, largest.value)
+    return f"{LABEL} up to {factor * largest.value:.4g} {unit} ({largest.side}) at {largest.station:.4g} m"
 
 
 def _largest(found: xr.Dataset) -> xr.DataArray:

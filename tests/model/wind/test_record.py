@@ -21,6 +21,8 @@ from ascentwind.model.wind.propagation import standard_deviation
 from ascentwind.model.wind.range_reference import range_reference, shipped_statistics
 from ascentwind.model.wind.record import WindOrigin, WindRecord
 from ascentwind.model.wind.shaping_filter import ShapingFilter
+from ascentwind.model.wind.soundings import read_soundings
+from ascentwind.model.wind.statistics import REPORT_SAMPLES
 from ascentwind.runners.cli.app import app
 from ascentwind.runners.construct.build_vehicle import build_vehicle
 from ascentwind.runners.wind import apply as wind_apply
@@ -65,6 +67,7 @@ def test_shipped_vehicles_hold_one_wind_and_load_without_a_word(name):
     wind = vehicle.wind
     assert wind.record is not None
     assert wind.record.origin == wind.shaping_filter.origin
+    assert wind.record.independent_samples == REPORT_SAMPLES
     assert wind.standard_deviation is not None
     h = np.linspace(3.0, 30000.0, 61)
     assert standard_deviation(wind.shaping_filter, h) == pytest.approx(wind.standard_deviation.polynomial(h), rel=1e-3)
@@ -238,6 +241,26 @@ def test_records_are_checked_when_made():
     for azimuth, sign, top in ((np.pi / 2, 1, 3e4), (0.0, 0, 3e4), (0.0, 2, 3e4), (np.nan, 1, 3e4), (0.0, 1, np.inf)):
         with pytest.raises(DataError):
             WindRecord(origin, azimuth, sign, top, "")
+    assert WindRecord(origin, 0.0, 1, 3e4, "").independent_samples is None
+    assert WindRecord(origin, 0.0, 1, 3e4, "", 1.5).independent_samples == 1.5
+    for samples in (1.0, 0.0, -80.0, np.nan, np.inf):
+        with pytest.raises(DataError, match="independent soundings"):
+            WindRecord(origin, 0.0, 1, 3e4, "", samples)
+
+
+def test_the_number_of_soundings_of_a_vehicles_wind_is_read_and_checked(vehicle_folder):
+    toml = vehicle_folder / "vehicle.toml"
+    text = toml.read_text()
+    line = next(line for line in text.splitlines() if line.startswith("independent_samples = "))
+    for written, found in (("independent_samples = 215.5", 215.5), ("", None)):
+        toml.write_text(text.replace(line, written))
+        record = quiet(vehicle_folder).wind.record
+        assert record is not None
+        assert record.independent_samples == found
+    for value in ("1", "0", "-80", "nan", "inf", '"80"', "true"):
+        toml.write_text(text.replace(line, f"independent_samples = {value}"))
+        with pytest.raises(DataError, match="independent_samples"):
+            load_vehicle(vehicle_folder)
 
 
 # the command
@@ -281,6 +304,7 @@ def test_the_command_writes_filter_mean_deviation_and_record_of_one_wind(falcon)
     record = vehicle.wind.record
     assert record is not None
     assert record.origin == WindOrigin("Cape Canaveral", "meridional", "february", "2006")
+    assert record.independent_samples == REPORT_SAMPLES
     assert (record.azimuth, record.sign, record.held_above) == (pytest.approx(np.pi / 2), 1, 30000.0)
     table = range_reference("february", "2006")
     kilometres = (table.altitude % 1000 == 0) & (table.altitude <= 30000)
@@ -395,6 +419,8 @@ def test_wind_of_soundings_carries_their_site_and_days(falcon, no_fit, tmp_path)
         record = load_vehicle(falcon).wind.record
     assert record is not None
     assert record.origin == WindOrigin("Omelek", "meridional", "2003-01-01 to 2003-01-31", "soundings of omelek.csv")
+    statistics = read_soundings(file).statistics("omelek").meridional
+    assert record.independent_samples == pytest.approx(statistics.independent_samples, abs=1e-3)
 
 
 def test_building_for_another_azimuth_asks_for_another_wind(falcon):

@@ -149,3 +149,43 @@ def test_mean_prints_both_means(ascentwind, tmp_path, as504):
     assert cells[2] == pytest.approx(float(expected[2]), abs=6e-5)
     assert (tmp_path / "found" / "mean_response.png").read_bytes().startswith(b"\x89PNG")
     assert "attitude (deg)" in (tmp_path / "found" / "mean_response.svg").read_text()
+
+
+@pytest.mark.slow
+def test_run_keeps_and_prints_levels_that_were_asked_for(ascentwind, tmp_path, as504):
+    printed = ascentwind(
+        "run", "as504", "--times", "70:80:5", "--probability", "0.01", "--along-vehicle", "75", "--out", "found"
+    )
+    statistics = as504.response_statistics([70.0, 75.0, 80.0])
+    level = statistics.percentile(0.01).sel(response="bending_moment")
+    k = int(level.argmax())
+    shown = re.escape(f"{float(level[k]) / 1e6:.4g} MN m")
+    assert re.search(rf"bending moment\W+{float(level['time'][k]):g} s\W+{shown}\W+upper", printed)
+    rows = list(csv.DictReader((tmp_path / "found" / "statistics.csv").open()))
+    row = next(r for r in rows if (r["time_s"], r["response"], r["source"]) == ("75", "bending_moment", "combined"))
+    assert float(row["level_0.01"]) == pytest.approx(float(level.sel(time=75.0)), rel=1e-8)
+    along = csv.DictReader((tmp_path / "found" / "bending_moment_along_vehicle.csv").open())
+    largest = max(abs(float(r["mean"])) + 3 * float(r["std"]) for r in along if r["source"] == "combined")
+    assert re.search(rf"bending moment\W+{re.escape(f'{largest / 1e6:.4g}')} MN m\W+mean [+-] 3σ", printed)
+
+
+@pytest.mark.slow
+def test_flight_load_keeps_and_prints_how_well_levels_are_known(ascentwind, tmp_path, as504):
+    asked = ("--window", "70:80", "--response", "engine_angle", "--probability", "0.01", "--sensitivity")
+    printed = ascentwind("flight-load", "as504", *asked, "--out", "found")
+    load = as504.flight_load("engine_angle", (70.0, 80.0), [0.01])
+    low, high = load.wind_interval()[0].values
+    (row,) = csv.DictReader((tmp_path / "found" / "flight_load.csv").open())
+    assert (row["side"], row["independent_samples"], row["monte_carlo_runs"]) == ("upper", "80", "230")
+    assert [float(row[f"wind_{end}_95"]) for end in ("lower", "upper")] == pytest.approx([low, high], rel=1e-6)
+    with xr.open_dataset(tmp_path / "found" / "flight_load.nc", engine="scipy") as stored:
+        np.testing.assert_allclose(np.ravel(stored["engine_angle_wind_interval"]), [low, high], rtol=1e-6)
+        assert stored["engine_angle_wind_interval"].attrs["units"] == "rad"
+        assert float(np.ravel(stored["engine_angle_monte_carlo_runs"])[0]) == 230
+    assert "by 80 independent soundings of the wind" in printed
+    assert "230 simulated flights without a failure" in printed
+    rows = list(csv.DictReader((tmp_path / "found" / "flight_load_sensitivity.csv").open()))
+    sizes = [abs(float(r["elasticity"])) for r in rows]
+    assert sizes == sorted(sizes, reverse=True)
+    assert {"wind.sigma_scale", "wind.mean_scale"} < {r["parameter"] for r in rows}
+    assert rows[0]["parameter"] in printed

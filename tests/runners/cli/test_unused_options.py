@@ -69,8 +69,10 @@ UNUSED = [
 
 # Options of every command: an option that is not here must be looked at, whether some other one makes it idle
 KNOWN = {
-    "run": {"times", "out", "engine", "method", "tolerance", "changes", "along_vehicle"},
-    "flight-load": {"window", "response", "probability", "limit", "sides", "draws", "seed", "out", "changes"},
+    "run": {"times", "out", "engine", "method", "tolerance", "changes", "along_vehicle", "probability"},
+    "flight-load": {
+        "window", "response", "probability", "limit", "sides", "sensitivity", "draws", "seed", "out", "changes",
+    },
     "vehicles": set(),
     "new-vehicle": {"source"},
     "inspect": {"time", "json", "changes"},

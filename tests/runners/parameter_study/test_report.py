@@ -121,6 +121,14 @@ def test_members_csv_holds_every_member(dispersed):
         assert (rows[m]["member"], rows[m]["status"], rows[m]["reason"]) == (str(m), "computed", "")
 
 
+def test_members_csv_names_the_side_of_each_peak(study, tmp_path):
+    found = reported(study, plan(grid={"quantity": [{"name": "level", "values": [-1.5, 1.5]}]}), tmp_path)
+    rows = found.tables["members.csv"]
+    assert [row["side, x"] for row in rows] == ["mean - 3σ", "mean + 3σ"]
+    first, second = (float(row["peak |mean| + 3 sigma of x (1)"]) for row in rows)
+    assert first == pytest.approx(second, rel=1e-9)
+
+
 def test_the_screen_shows_whole_numbers_in_a_narrow_terminal(dispersed, study, tmp_path):
     peak = upper(dispersed.stored).max(axis=1)
     assert "300 members: 300 computed, 0 unstable, 0 failed" in dispersed.text

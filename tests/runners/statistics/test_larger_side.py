@@ -111,6 +111,22 @@ def of_run_along_vehicle(study: Study, folder: Path, ascentwind) -> list[float]:
     return [time, *limits, float(meshes.collections[0].get_array().max())]
 
 
+def test_the_largest_along_the_vehicle_names_its_side():
+    mean = np.array([[1.0, -4.0, 2.0], [3.0, -2.0, 1.0]])
+    for factor, name in ((1.0, "mean - 3σ"), (-1.0, "mean + 3σ")):
+        found = xr.Dataset(
+            {
+                "mean": (("time", "station"), factor * mean),
+                "std": (("time", "station", "source"), np.full((2, 3, 2), 0.5)),
+            },
+            {"time": [70.0, 75.0], "station": [0.0, 20.0, 40.0], "source": ["wind", "combined"]},
+            {"load": "shear_force"},
+        )
+        largest = along_vehicle_output.LargestAlong.of(found)
+        assert (largest.value, largest.side, largest.station, largest.time) == (5.5, name, 20.0, 70.0)
+        assert (largest.mean, largest.unit) == (-4.0 * factor, "N")
+
+
 def of_sensitivity(study: Study, folder: Path, ascentwind) -> list[float]:
     ascentwind("sensitivity", "--out", str(folder))
     with xr.open_dataset(folder / "sensitivity.nc", engine="scipy") as found:

@@ -139,8 +139,9 @@ def test_runs_with_failures_are_the_least_that_show_it(p, risk, failures):
 
 @pytest.mark.parametrize(
     ("p", "risk", "failures"),
-    [(0.0, 0.1, 0), (1.0, 0.1, 0), (0.1, 0.0, 0), (0.1, 1.0, 0), (0.1, 0.1, -1), (0.1, 0.1, 1.5), (1e-12, 0.1, 1), (5e-324, 0.1, 0),
-     (float("nan"), 0.1, 0), (0.1, float("nan"), 0), (0.1, 0.1, float("nan")), (0.1, 0.1, float("inf"))],
+    [(0.0, 0.1, 0), (1.0, 0.1, 0), (0.1, 0.0, 0), (0.1, 1.0, 0), (0.1, 0.1, -1), (0.1, 0.1, 1.5), (1e-12, 0.1, 1),
+     (5e-324, 0.1, 0), (float("nan"), 0.1, 0), (0.1, float("nan"), 0),
+     (0.1, 0.1, float("nan")), (0.1, 0.1, float("inf"))],
 )  # fmt: skip
 def test_runs_that_cannot_be_counted_are_refused(p, risk, failures):
     with pytest.raises(ParameterValueError):
