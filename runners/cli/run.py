@@ -194,14 +194,12 @@ def _print_instant_levels(statistics: ResponseStatistics, probability: float) ->
     from ..present.style import display, words
 
     found = statistics.percentile(probability)
-    table = Table(
-        "response", title=f"Largest level that the size of a response passes with {probability:g} at an instant"
-    )
+    table = Table("response", title=f"Passed with {probability:g} at an instant, in size")
     for column in ("time", "level", "larger side"):
         table.add_column(column, justify="right", no_wrap=True)
     for name in found["response"].values:
         at = found.sel(response=name)
-        at = at.isel(time=int(at.argmax()))
+        at = at.isel(time=int(at.values.argmax()))
         factor, unit = display(str(at["unit"].item()), float(at))
         time = f"{float(at['time']):g} s"
         table.add_row(words(str(name)), time, f"{factor * float(at):.4g} {unit}", str(at["side"].item()))

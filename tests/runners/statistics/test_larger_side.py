@@ -33,6 +33,7 @@ from ascentwind.runners.statistics.larger_side import LARGER_SIDE, larger_side, 
 from ascentwind.runners.statistics.results import ResponseStatistics
 from ascentwind.runners.views import along_vehicle_files as along_vehicle_output
 
+PLUS, MINUS = "equivalent_axial_load_plus_y", "equivalent_axial_load_minus_y"
 NUMBERS = {"a": 0.8, "b": 2.0, "c": 0.3, "g": 0.5}
 
 
@@ -92,23 +93,32 @@ def test_a_mean_of_zero_has_an_upper_side():
 # one function a command: what it tells people, as numbers
 
 
+def by_name(study: Study, found: dict[str, list[float]]) -> list[float]:
+    """Return what is told of each response; where the wind is mirrored the two sides of the vehicle change places."""
+    other = {PLUS: MINUS, MINUS: PLUS} if study.parameters["wind.mean_scale"].value < 0 else {}
+    return [number for name in found for number in found[other.get(name, name)]]
+
+
 def of_run(study: Study, folder: Path, ascentwind) -> list[float]:
     ascentwind("run", "--times", "70:80:5", "--out", str(folder))
     found = ResponseStatistics.open(folder)
     assert (np.sign(found["peak_side"]) == np.sign(found["peak_reference_mean"])).all()
-    return [*found["peak"].values, *found["peak_time"].values]
+    told = zip(found["response"].values, found["peak"].values, found["peak_time"].values, strict=True)
+    return by_name(study, {str(name): [peak, time] for name, peak, time in told})
 
 
 def of_run_along_vehicle(study: Study, folder: Path, ascentwind) -> list[float]:
     drawn = []
     with pytest.MonkeyPatch.context() as patch:
         draw = along_vehicle_output.along_figure
-        patch.setattr(along_vehicle_output, "along_figure", lambda *a: drawn.append((a[1], draw(*a))) or drawn[-1][1])
+        patch.setattr(along_vehicle_output, "along_figure", lambda *a: drawn.append((*a[:2], draw(*a))) or drawn[-1][2])
         ascentwind("run", "--times", "75,80", "--along-vehicle", "peak", "--out", str(folder))
-    ((time, figure),) = drawn
-    section, envelope, meshes = figure.axes[1:4]
-    limits = [np.abs(axes.get_ylim()).max() for axes in (section, envelope)]
-    return [time, *limits, float(meshes.collections[0].get_array().max())]
+    told = {}
+    for found, time, figure in drawn:
+        section, envelope, meshes = figure.axes[1:4]
+        limits = [np.abs(axes.get_ylim()).max() for axes in (section, envelope)]
+        told[found.attrs["load"]] = [time, *limits, float(meshes.collections[0].get_array().max())]
+    return by_name(study, told)
 
 
 def test_the_largest_along_the_vehicle_names_its_side():
@@ -136,14 +146,14 @@ def of_sensitivity(study: Study, folder: Path, ascentwind) -> list[float]:
 
 def of_figure(study: Study, folder: Path, ascentwind) -> list[float]:
     found = study.response_statistics([70.0, 75.0, 80.0])
-    notes = []
+    notes = {}
     for name in found["response"].values:
         (note,) = found.plot(str(name), "title").axes[0].texts
         assert isinstance(note, Annotation)
-        said = re.fullmatch(r"\|mean\| \+ 3σ: (\S+) (?:MN m|deg) at (\S+) s", note.get_text())
+        said = re.fullmatch(r"\|mean\| \+ 3σ: (\S+) (?:MN m|deg|kN|MN|kPa deg) at (\S+) s", note.get_text())
         assert said
-        notes += [float(said[1]), float(said[2]), abs(note.xy[1])]
-    return notes
+        notes[str(name)] = [float(said[1]), float(said[2]), abs(note.xy[1])]
+    return by_name(study, notes)
 
 
 def of_study(study: Study, folder: Path, ascentwind) -> list[float]:
