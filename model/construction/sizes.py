@@ -96,8 +96,9 @@ def _sizes(construction: Construction) -> Iterator[tuple[str, str, bool]]:
     slope = np.array([max(c.slope.max(), -c.slope.min()) for c in construction.normal_force])
     for component, size in zip(construction.normal_force, slope, strict=True):
         yield from beyond(
-            f"normal_force.{component.name}.file", float(size), (0.0, 60.0), (0.0, 6000.0),
-            f"has a slope of {size:g} per rad; look at its unit (1/rad) and at reference_area_m2",
+            f"normal_force.{component.name}.file", float(size), (0.0, 12.0), (0.0, 6000.0),
+            f"has a slope of {size:g} per rad, where a slender nose makes 2 on its own cross-section, and fins "
+            "some; look at its unit (1/rad) and at reference_area_m2",
         )  # fmt: skip
     radii = np.sqrt(construction.stiffness.bending / construction.stiffness.shear / 2.6)
     for station, radius in zip(construction.stiffness.station, radii, strict=True):

@@ -11,22 +11,27 @@ from numpy.typing import NDArray
 from ..errors import PlausibilityWarning
 from ..files.csv_table import read_csv_table
 from ..files.folder_files import file_inside
-from ..vehicle.columns import TIME, local_columns
+from ..vehicle.columns import RADIUS, TIME, local_columns
+from ..vehicle.loads import AXIAL_FORCE, BENDING_MOMENT, SHEAR_FORCE
 from ..vehicle.shipped import VEHICLE_FILE
 from ..vehicle.vehicle import Vehicle
-from .station_loads import StationLoads, load_station_loads
+from .station_loads import KEYS, SAME_STATION, StationLoads, load_station_loads
 
 CONSTRUCTION_FILE = "construction.toml"
 SAME_AREA = 1e-6  # relative
 DIFFERENT = 0.01  # of the largest value of the column
+NEAR = 0.05  # of the length, either way of a place, over which a mode's displacement is nearly that of the place
+OFF_MODE = 0.2  # of the mode's largest displacement: what that, and stations far apart, leave; it is 0.1 at most
 
 
 def compare_stated_twice(vehicle: Vehicle) -> None:
     """Hold the loads along the vehicle and the integrals of the normal force against the other tables.
 
     The loads' own tables are stations along the vehicle. Forward of the aft end lies the whole vehicle: S_1 is there
-    mass times X_CG - x and S_2 the moment of inertia. The integral of c'_N times x - X_CG is C'_N (X_CP - X_CG).
-    A construction beside the vehicle has its reference area.
+    mass times X_CG - x, S_2 the moment of inertia and slosh minus its mass times x_S - x; shear and axial force have
+    the mass. From station to station the inertia of a mode is minus the mass between them times its displacement there.
+    The integral of c'_N times x - X_CG is C'_N (X_CP - X_CG). A construction beside the vehicle
+    has its reference area.
 
     Raises
     ------
@@ -38,25 +43,99 @@ def compare_stated_twice(vehicle: Vehicle) -> None:
     PlausibilityWarning
         Both numbers, and where they stand.
     """
-    if vehicle.file.tables.loads_along_vehicle is not None:
-        _compare_whole(vehicle, load_station_loads(vehicle))
+    for load, key in KEYS.items():
+        entry = getattr(vehicle.file.tables, key)
+        if entry is not None:
+            _compare_whole(vehicle, load, entry.file, load_station_loads(vehicle, load))
     if vehicle.file.tables.local_aerodynamics is not None:
         _compare_arm(vehicle)
     _compare_area(vehicle)
 
 
-def _compare_whole(vehicle: Vehicle, along: StationLoads) -> None:
-    entry = vehicle.file.tables.loads_along_vehicle
-    assert entry is not None
-    name, aft = entry.file, along.forward_of_gimbal[0]
-    first, second = along.tables["first_moment"][0], along.tables["second_moment"][0]
-    if np.abs(along.tables["engine_angle"][0].values).max() > 0:  # not the aft end
+def _compare_whole(vehicle: Vehicle, load: str, name: str, along: StationLoads) -> None:
+    """Hold what lies forward of the aft end against the whole vehicle, and the radius at stations against their own."""
+    aft = along.forward_of_gimbal[0]
+    time = _common(vehicle, next(iter(along.tables.values()))[0].argument)
+    mass, center = (_at(vehicle, table, time) for table in ("mass", "center_of_gravity"))
+    whole = {
+        BENDING_MOMENT: (
+            ("first_moment", mass * (center - aft), "mass and center_of_gravity"),
+            ("second_moment", _at(vehicle, "moment_of_inertia", time), "moment_of_inertia"),
+        ),
+        SHEAR_FORCE: (("first_moment", mass, "mass"),),
+        AXIAL_FORCE: (("mass_forward", mass, "mass"),),
+    }[load]
+    if load == BENDING_MOMENT:
+        whole += tuple(
+            (
+                f"slosh_{tank.name}",
+                _at(vehicle, f"slosh.{tank.name}.mass", time)
+                * (aft - _at(vehicle, f"slosh.{tank.name}.attach_point", time)),
+                f"mass and attach_point of {tank.name}",
+            )
+            for tank in vehicle.slosh
+        )
+    if load == SHEAR_FORCE:
+        _compare_modes(vehicle, name, along)
+    if load == AXIAL_FORCE:
+        _compare_radius(vehicle, name, along)
+    elif np.abs(along.tables["engine_angle"][0].values).max() > 0:  # not the aft end
         return
-    time = _common(vehicle, first.argument)
-    mass, center = (_at(vehicle, name, time) for name in ("mass", "center_of_gravity"))
-    _tell(name, "first_moment", time, first.polynomial(time), mass * (center - aft), "mass and center_of_gravity")
-    inertia = _at(vehicle, "moment_of_inertia", time)
-    _tell(name, "second_moment", time, second.polynomial(time), inertia, "moment_of_inertia")
+    for column, made, what in whole:
+        _tell(name, column, time, np.asarray(along.tables[column][0].polynomial(time)), made, what)
+
+
+def _compare_modes(vehicle: Vehicle, name: str, along: StationLoads) -> None:
+    """Hold displacements of modes against the inertia in shear over a tenth of the vehicle around the place."""
+    time = _common(vehicle, along.tables["first_moment"][0].argument)
+    if not time.size:
+        return
+    place, columns = along.forward_of_gimbal, along.at(time)
+    reach = NEAR * (place[-1] - place[0])
+    points = {"gimbal": np.zeros_like(time)}
+    points |= {tank.name: _at(vehicle, f"slosh.{tank.name}.attach_point", time) for tank in vehicle.slosh}
+
+    def around(column: str, at: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return how much less of a coefficient lies forward of the near end than of the far one."""
+        ends = [
+            [np.interp(x + side, place, row) for x, row in zip(at, columns[column], strict=True)]
+            for side in (-reach, reach)
+        ]
+        return np.subtract(*ends)
+
+    for i in range(1, len(vehicle.bending) + 1):
+        file, inertia = vehicle.folder / vehicle.file.bending[i - 1].table.file, f"bending_{i}"
+        stated = {point: _at(vehicle, f"bending.{i}.displacement_at_{point}", time) for point in points}
+        largest = float(np.max(np.abs(list(stated.values()))))
+        for point, at in points.items():
+            mass = around("first_moment", at)
+            made = np.where(mass > 0, -around(inertia, at) / np.where(mass > 0, mass, 1.0), stated[point])
+            worst = int(np.argmax(np.abs(stated[point] - made)))
+            if abs(stated[point][worst] - made[worst]) > OFF_MODE * largest:
+                warnings.warn(
+                    PlausibilityWarning(
+                        f"{file}, column 'displacement_at_{point}', t = {time[worst]:g} s: is "
+                        f"{stated[point][worst]:.4g}, but first_moment and {inertia} of {name} make {made[worst]:.4g} "
+                        f"at {at[worst]:.4g} m; look at its sign, scale and place"
+                    ),
+                    stacklevel=5,
+                )
+
+
+def _compare_radius(vehicle: Vehicle, name: str, along: StationLoads) -> None:
+    for i, load in enumerate(vehicle.file.loads):
+        k = int(np.argmin(np.abs(along.station - load.station_m)))
+        if load.radius_m is None or abs(along.station[k] - load.station_m) > SAME_STATION:
+            continue
+        stated = float(along.tables[RADIUS.name][k].values[0])
+        if abs(load.radius_m - stated) > DIFFERENT * stated:
+            warnings.warn(
+                PlausibilityWarning(
+                    f"{vehicle.folder / VEHICLE_FILE}, column 'loads.{i}.radius_m': is {load.radius_m:g} m, but {name} "
+                    f"has {stated:g} m at station {load.station_m:g} m; look at its unit and station"
+                ),
+                stacklevel=4,
+            )
 
 
 def _compare_arm(vehicle: Vehicle) -> None:

@@ -34,6 +34,7 @@ TOP, BOTTOM = 81_000.0, -5_000.0  # m, of its tables
 FELT = 0.1  # of the largest dynamic pressure: below, ratios to it are of no consequence
 SHORTEST = 0.01  # s, between rows whose difference is taken as a rate
 SLOSH_ROOT = 1.841  # omega^2 R / a of the first lateral mode in a deep circular tank
+SAME_TANK = 1.4  # times the radius that a frequency belongs to at most, while most of the liquid sloshes
 SAME_STATION = 1e-3  # m
 # one sigma of biases: number shown of what is kept, least and largest of them without a word, in what unit
 RELATIVE_BIAS = 1.0, 5e-4, 0.2, "parts of 1"
@@ -327,6 +328,14 @@ class _Compared:
                 self.time == self.time[0], frequency=frequency, acceleration=acceleration, radius=radius, own=own,
             )  # fmt: skip
             mass = self.at(f"{table}.mass")
+            full = (mass > 0.8 * mass.max()) & (acceleration > 0)
+            usual = float(np.median(radius[full])) if full.any() else np.inf
+            yield from self.beyond(
+                table, "frequency", radius / usual, (1 / SAME_TANK, SAME_TANK), (0.0, np.inf),
+                "is {frequency:.4g} rad/s, which at {acceleration:.4g} m/s2 belongs to a tank of {radius:.3g} m "
+                "radius, at other times to one of {usual:.3g} m; look at its rows and those of axial_acceleration",
+                full, frequency=frequency, acceleration=acceleration, radius=radius, usual=usual,
+            )  # fmt: skip
             yield from self.beyond(
                 table, "mass", mass / self.mass, (1e-4, np.inf), (0.0, np.inf),
                 "is at most {own:.3g} kg on a vehicle of {mass:.4g} kg; look at its unit, or leave the tank out",
@@ -417,12 +426,15 @@ class _Compared:
             if f"{table}.{name}" not in self.vehicle.tables:
                 continue  # only read where a noise moves the normal force
             values = self.at(f"{table}.{name}")
-            yield from self.beyond(
-                table, name, np.abs(values) / np.maximum(slope * size, 1e-300), (0.0, 5.0), (0.0, np.inf),
-                f"is {{values:.4g}}, but normal_force_slope is {{slope:.4g}} and the mode's {column} at "
-                "most {{size:.3g}}; look at its scale",
-                self.felt, values=values, slope=slope, size=size,
-            )  # fmt: skip
+            part = np.abs(values) / np.maximum(slope * size, 1e-300)
+            largest = (part == part[self.felt].max()) & self.felt
+            for limits, rows in (((0.0, 5.0), self.felt), ((1e-3, np.inf), largest)):
+                yield from self.beyond(
+                    table, name, part, limits, (0.0, np.inf),
+                    f"is {{values:.4g}}, but normal_force_slope is {{slope:.4g}} and the mode's {column} at "
+                    "most {size:.3g}; look at its scale",
+                    rows, values=values, slope=slope, size=size,
+                )  # fmt: skip
 
     def _largest(self, table: str, columns: list[str]) -> Array:
         return np.max([np.abs(self.at(f"{table}.{c}")) for c in columns], axis=0)

@@ -211,6 +211,7 @@ SHAPES = [
     ("bending_2.csv", "slope_at_sensor", 1e3, r"look at the units of slopes \(1/m\)"),
     ("bending_1.csv", "displacement_at_gimbal", 1e3, "at displacements up to"),
     ("bending_1.csv", "normal_force_slope_times_displacement", 57.3, "look at its scale"),
+    ("bending_2.csv", "normal_force_slope_times_slope", 1e-6, "look at its scale"),
     ("loads_station_10m.csv", "bending_1", 1e3, "where its mass at the radius of gyration"),
     ("loads_station_10m.csv", "slosh_s1_lox", 1e3, "where its mass at the radius of gyration"),
 ]  # fmt: skip
@@ -220,6 +221,13 @@ SHAPES = [
 def test_modes_and_loads_of_another_scale(tmp_path, file, column, factor, message):
     folder = change_table(copied("falcon1", tmp_path), file, scaled(column, factor))
     with pytest.warns(PlausibilityWarning, match=message):
+        load_vehicle(folder)
+
+
+def test_slosh_of_another_time(tmp_path):
+    """A tank keeps its radius: what omega^2 is to the axial acceleration cannot change while it is full."""
+    folder = change_table(copied("falcon1", tmp_path), "slosh_s2_lox.csv", shifted("frequency", 38))
+    with pytest.warns(PlausibilityWarning, match=r"'frequency'.*belongs to a tank of .* at other times to one of 0.573 m"):
         load_vehicle(folder)
 
 
@@ -242,6 +250,46 @@ BESIDE = {  # file, change, what run tells
     "inertia of another time": (R, shifted("moment_of_inertia", 30), "'second_moment'.*but moment_of_inertia make"),
     "centre of gravity moved": (R, scaled("center_of_gravity", 1.1), "'first_moment'.*but mass and center_of_gravity"),
     "normal force of another time": ("aerodynamics.csv", shifted("normal_force_slope", 30), "'arm'.*but normal_force"),
+    "shear force of a mode turned": (
+        "shear_station_10m.csv",
+        scaled("bending_1", -1.0),
+        "shear_along_vehicle.csv, column 'bending_1'.*build both again",
+    ),
+    "mass forward in tonnes": (
+        "axial_station_10m.csv",
+        scaled("mass_forward", 1e-3),
+        "axial_along_vehicle.csv, column 'mass_forward'.*build both again",
+    ),
+    "shear force of half the vehicle": (
+        "shear_along_vehicle.csv",
+        scaled("first_moment", 0.5),
+        "'first_moment'.*but mass make",
+    ),
+    "axial force of half the vehicle": (
+        "axial_along_vehicle.csv",
+        scaled("mass_forward", 0.5),
+        "'mass_forward'.*but mass make",
+    ),
+    "mode turned at a tank": (
+        "bending_1.csv",
+        scaled("displacement_at_s2_lox", -1.0),
+        "'displacement_at_s2_lox'.*but first_moment and bending_1 of shear_along_vehicle.csv make",
+    ),
+    "mode of another scale at the gimbal": (
+        "bending_2.csv",
+        scaled("displacement_at_gimbal", 0.3048),
+        "'displacement_at_gimbal'.*but first_moment and bending_2",
+    ),
+    "slosh of a tank aft of all stations": (
+        "slosh_s1_rp1.csv",
+        scaled("mass", 0.4536),
+        "'slosh_s1_rp1'.*but mass and attach_point of s1_rp1 make",
+    ),
+    "another radius": (
+        "axial_along_vehicle.csv",
+        scaled("radius", 2.0),
+        r"'loads.0.radius_m': is 0.84023 m, but axial_along_vehicle.csv has 1.68046 m at station 10",
+    ),
 }
 
 

@@ -138,7 +138,7 @@ def test_library_raises_keyboard_interrupt(as504, engine):
         for _ in range(1000):
             as504.response_statistics(np.arange(20.0, 140.0), engine=options or engine)
     timer.join()
-    assert as504.response_statistics([20.0], engine=engine).variance.values.min() > 0
+    assert as504.response_statistics([20.0], engine=engine).variance.sel(response="bending_moment").min() > 0
 
 
 @pytest.mark.skipif(signal.getsignal(signal.SIGINT) is signal.SIG_IGN, reason="SIGINT is ignored here")
@@ -150,19 +150,117 @@ def test_batch_is_stopped_within_a_sweep(as504):
     assert time.process_time() - begin < 0.5 * available_cores() + SLOWEST
 
 
-def test_flag_reaches_what_the_threads_call():
+def compute_until_stopped(begun: threading.Event):
+    """Return what a thread computes on and on, as compiled code does, until its flag is raised."""
+
     def compiled(flag) -> int:
         begun.set()
         while not flag[0]:
             time.sleep(0.001)
         return -1
 
+    return compiled
+
+
+def test_flag_reaches_what_the_threads_call():
     begun, futures = threading.Event(), []
     with pytest.raises(ZeroDivisionError), Workers(1) as pool:
-        futures += [pool.submit(interruptible, compiled) for _ in range(2)]
+        futures += [pool.submit(interruptible, compute_until_stopped(begun)) for _ in range(2)]
         begun.wait()
         raise ZeroDivisionError
     running, waiting = futures
     assert waiting.cancelled()
     with pytest.raises(KeyboardInterrupt):
         running.result()
+
+
+class Swallowed:
+    """Gone through a destructor, in which Python drops every exception."""
+
+    def __del__(self) -> None:
+        signal.raise_signal(signal.SIGINT)
+
+
+LOCK = threading.Lock()
+
+
+def in_a_destructor() -> None:
+    Swallowed()
+
+
+def with_a_lock_taken() -> None:
+    """As within ``with condition:``, before its block, where Python's own locks stay taken."""
+    LOCK.acquire()
+    signal.raise_signal(signal.SIGINT)
+    LOCK.release()
+
+
+@pytest.mark.skipif(signal.getsignal(signal.SIGINT) is signal.SIG_IGN, reason="SIGINT is ignored here")
+@pytest.mark.parametrize("moment", [in_a_destructor, with_a_lock_taken])
+def test_no_moment_loses_it(moment):
+    """The threads are stopped, no lock stays taken, and the exception comes out of the block."""
+    begun, futures, before = threading.Event(), [], signal.getsignal(signal.SIGINT)
+    with pytest.raises(KeyboardInterrupt), Workers(2) as pool:
+        futures += [pool.submit(interruptible, compute_until_stopped(begun)) for _ in range(4)]
+        begun.wait()
+        moment()
+        for future in futures:
+            with pytest.raises(KeyboardInterrupt):
+                future.result(timeout=10.0)
+        with pytest.raises(KeyboardInterrupt):
+            pool.submit(int)
+    assert all(future.done() for future in futures)
+    assert not LOCK.locked()
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+@pytest.mark.skipif(signal.getsignal(signal.SIGINT) is signal.SIG_IGN, reason="SIGINT is ignored here")
+def test_batch_of_many_is_stopped_wherever_it_is(as504):
+    """Most of the time of so many goes into handing them to the threads, whose locks are Python's own."""
+    times = np.arange(20.0, 140.0)
+    for seconds in np.linspace(0.05, 0.5, 8):
+        timer = signal_after(seconds)
+        with pytest.raises(KeyboardInterrupt):
+            as504.batch([{}] * 5000, times)
+        timer.join()
+
+
+def test_pools_within_each_other_all_stop():
+    """Those of a generator may outlive one made after them."""
+    begun, before = threading.Event(), signal.getsignal(signal.SIGINT)
+    outer, inner = Workers(1), Workers(1)
+    with pytest.raises(KeyboardInterrupt), outer, inner:
+        waiting = [pool.submit(interruptible, compute_until_stopped(begun)) for pool in (outer, inner)]
+        begun.wait()
+        signal.raise_signal(signal.SIGINT)
+        for future in waiting:
+            with pytest.raises(KeyboardInterrupt):
+                future.result(timeout=10.0)
+    assert signal.getsignal(signal.SIGINT) is before
+    outer, inner = Workers(1), Workers(1)
+    outer.__enter__()
+    inner.__enter__()
+    outer.__exit__(None, None, None)
+    inner.__exit__(None, None, None)
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_a_handler_of_ones_own_decides():
+    """One that raises nothing has not asked for an end; a second Ctrl-C is raised at once."""
+    heard: list[int] = []
+    before = signal.signal(signal.SIGINT, lambda number, _: heard.append(number))
+    try:
+        with Workers(1) as pool:
+            signal.raise_signal(signal.SIGINT)
+            assert pool.submit(int, "7").result() == 7
+        assert heard == [signal.SIGINT]
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        reached = []
+        with pytest.raises(KeyboardInterrupt), Workers(1):
+            signal.raise_signal(signal.SIGINT)
+            reached.append("after the first")
+            signal.raise_signal(signal.SIGINT)
+            reached.append("after the second")
+        assert reached == ["after the first"]
+    finally:
+        signal.signal(signal.SIGINT, before)
