@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import PlausibilityWarning
-from ..files.csv_table import read_csv_table
+from ..files.csv_table import CsvTable, read_csv_table
 from ..files.folder_files import file_inside
 from ..vehicle.columns import RADIUS, TIME, local_columns
 from ..vehicle.loads import AXIAL_FORCE, BENDING_MOMENT, SHEAR_FORCE
@@ -21,6 +21,7 @@ CONSTRUCTION_FILE = "construction.toml"
 SAME_AREA = 1e-6  # relative
 DIFFERENT = 0.01  # of the largest value of the column
 NEAR = 0.05  # of the length, either way of a place, over which a mode's displacement is nearly that of the place
+NEGATIVE = 0.1  # an eigenvalue of integrals of pairs, scaled to ones on the diagonal, by boat-tails
 OFF_MODE = 0.2  # of the mode's largest displacement: what that, and stations far apart, leave; it is 0.1 at most
 
 
@@ -151,6 +152,42 @@ def _compare_arm(vehicle: Vehicle) -> None:
     made = slope * (pressure - gravity)
     what = "normal_force_slope, center_of_pressure and center_of_gravity"
     _tell(entry.file, arm.name, time, stated[np.isin(all_times, time)], made, what)
+    _compare_products(vehicle, csv, time)
+
+
+def _compare_products(vehicle: Vehicle, csv: CsvTable, time: NDArray[np.float64]) -> None:
+    """Hold sum c'_N Y against the other integrals of c'_N times 1, x - X_CG and Y, by pairs: a Gram matrix.
+
+    With c'_N of one sign it has no negative eigenvalue, scaled to ones on its diagonal; boat-tails leave small ones.
+    """
+    modes, rows = range(1, len(vehicle.bending) + 1), np.isin(csv.columns[TIME.name], time)
+    units = {column.name: column.unit for column in local_columns(len(vehicle.bending))}
+
+    def integral(name: str) -> NDArray[np.float64]:
+        return csv.column(name, units[name])[rows]
+
+    gram = np.empty((time.size, len(modes) + 2, len(modes) + 2))
+    gram[:, 0, 0], gram[:, 0, 1] = _at(vehicle, "normal_force_slope", time), integral("arm")
+    gram[:, 1, 1] = integral("arm_squared")
+    for i in modes:
+        gram[:, 0, i + 1] = _at(vehicle, f"bending.{i}.normal_force_slope_times_displacement", time)
+        gram[:, 1, i + 1] = integral(f"arm_displacement_{i}")
+        for j in modes[i - 1 :]:
+            gram[:, i + 1, j + 1] = integral(f"displacement_{i}_displacement_{j}")
+    size = np.sqrt(np.abs(np.einsum("tii->ti", gram)))
+    scaled = gram / np.where(size > 0, size, 1.0)[:, :, None] / np.where(size > 0, size, 1.0)[:, None, :]
+    least = np.linalg.eigvalsh(scaled, UPLO="U")[:, 0]
+    if not least.size or least.min() >= -NEGATIVE:
+        return
+    worst = int(np.argmin(least))
+    warnings.warn(
+        PlausibilityWarning(
+            f"{csv.file}, t = {time[worst]:g} s: no normal force along the vehicle has both its integrals and the "
+            "normal_force_slope and normal_force_slope_times_displacement of the other tables; look at the signs, "
+            "scales and rows of all"
+        ),
+        stacklevel=4,
+    )
 
 
 def _compare_area(vehicle: Vehicle) -> None:

@@ -34,7 +34,7 @@ TOP, BOTTOM = 81_000.0, -5_000.0  # m, of its tables
 FELT = 0.1  # of the largest dynamic pressure: below, ratios to it are of no consequence
 SHORTEST = 0.01  # s, between rows whose difference is taken as a rate
 SLOSH_ROOT = 1.841  # omega^2 R / a of the first lateral mode in a deep circular tank
-SAME_TANK = 1.4  # times the radius that a frequency belongs to at most, while most of the liquid sloshes
+SAME_TANK = 1.2  # times the radius that a frequency belongs to at most, while all of the liquid sloshes that ever does
 SAME_STATION = 1e-3  # m
 # one sigma of biases: number shown of what is kept, least and largest of them without a word, in what unit
 RELATIVE_BIAS = 1.0, 5e-4, 0.2, "parts of 1"
@@ -306,6 +306,15 @@ class _Compared:
             "is {part:.4g} N, more than the whole thrust, {thrust:.4g} N; look at the two columns",
             part=part, thrust=thrust,
         )  # fmt: skip
+        share = part / np.maximum(thrust, 1e-300)
+        phase = np.searchsorted(self.vehicle.tables["thrust"].breaks, self.time, side="right")
+        usual = np.array([np.median(share[phase == k]) for k in phase])
+        yield from self.beyond(
+            "propulsion", "control_thrust", share / np.maximum(usual, 1e-300), (0.97, 1.03), (-np.inf, np.inf),
+            "is {x:.4g} times its usual share {usual:.4g} of the thrust, {thrust:.4g} N, though no event lies between: "
+            "look at the rows of the two columns, or name the time at which engines stop under [events]",
+            share > 0, usual=usual, thrust=thrust,
+        )  # fmt: skip
 
     def slosh(self) -> Iterator[Contradiction]:
         """Frequencies of a tank of some radius at the axial acceleration; masses below the vehicle's."""
@@ -322,13 +331,13 @@ class _Compared:
             )  # fmt: skip
             own = np.sqrt(self.area / np.pi)
             yield from self.beyond(
-                table, "frequency", radius / own, (0.1, 2.0), (0.0, np.inf),
+                table, "frequency", radius / own, (0.1, 1.5), (0.0, np.inf),
                 "is {frequency:.4g} rad/s, which at {acceleration:.4g} m/s2 belongs to a tank of {radius:.3g} m "
                 "radius, where reference_area_m2 is a circle of {own:.3g} m; look at its unit, rad/s, and at both",
                 self.time == self.time[0], frequency=frequency, acceleration=acceleration, radius=radius, own=own,
             )  # fmt: skip
             mass = self.at(f"{table}.mass")
-            full = (mass > 0.8 * mass.max()) & (acceleration > 0)
+            full = (mass > 0.98 * mass.max()) & (acceleration > 0)
             usual = float(np.median(radius[full])) if full.any() else np.inf
             yield from self.beyond(
                 table, "frequency", radius / usual, (1 / SAME_TANK, SAME_TANK), (0.0, np.inf),

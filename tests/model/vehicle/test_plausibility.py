@@ -224,10 +224,19 @@ def test_modes_and_loads_of_another_scale(tmp_path, file, column, factor, messag
         load_vehicle(folder)
 
 
+def test_control_thrust_of_another_time(tmp_path):
+    """The same engines swivel until some stop."""
+    folder = change_table(copied("as504", tmp_path), "propulsion.csv", shifted("control_thrust", 38))
+    with pytest.warns(PlausibilityWarning, match=r"'control_thrust'.*times its usual share 0.8"):
+        load_vehicle(folder)
+
+
 def test_slosh_of_another_time(tmp_path):
     """A tank keeps its radius: what omega^2 is to the axial acceleration cannot change while it is full."""
     folder = change_table(copied("falcon1", tmp_path), "slosh_s2_lox.csv", shifted("frequency", 38))
-    with pytest.warns(PlausibilityWarning, match=r"'frequency'.*belongs to a tank of .* at other times to one of 0.573 m"):
+    with pytest.warns(
+        PlausibilityWarning, match=r"'frequency'.*belongs to a tank of .* at other times to one of 0.573 m"
+    ):
         load_vehicle(folder)
 
 
@@ -279,6 +288,11 @@ BESIDE = {  # file, change, what run tells
         "bending_2.csv",
         scaled("displacement_at_gimbal", 0.3048),
         "'displacement_at_gimbal'.*but first_moment and bending_2",
+    ),
+    "air force on a mode turned": (
+        "bending_2.csv",
+        scaled("normal_force_slope_times_displacement", -1.0),
+        "local_aerodynamics.csv, t = .*: no normal force along the vehicle has both its integrals and",
     ),
     "slosh of a tank aft of all stations": (
         "slosh_s1_rp1.csv",
