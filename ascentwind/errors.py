@@ -47,6 +47,7 @@ __getattr__, __dir__, __all__ = _lazy.attach(
             "SpacingWarning",
             "UncheckedStationsWarning",
         ],
+        "runners.flight_load.upcrossings": ["NotDifferentiableError"],
         "runners.parameter_study.cluster": ["SchedulerError"],
         "runners.parameter_study.sampling": ["UnbalancedSampleWarning"],
         "runners.parameter_study.store": ["ResumeError"],

@@ -29,10 +29,11 @@ from .passage import LimitedLoad, Passage
 from .pathwise import Movement, movement
 from .probability import Estimate, Level, estimate, find_level
 from .process import OneOutput
-from .request import SpacingWarning, checked_draws, refuse_without_variance
+from .request import SpacingWarning, checked_draws, checked_level, refuse_without_variance
 from .response import ResponseInWindow
 from .sampling import draw_beyond
 from .sensitivity import level_sensitivity
+from .upcrossings import upcrossing_rate
 from .wind_interval import wind_intervals
 from .window import checked_window
 
@@ -229,10 +230,31 @@ class FlightLoad:
         ParameterValueError
             The value is no finite number.
         """
-        if not np.isfinite(value):
-            raise ParameterValueError(f"the chance of passing {value} cannot be computed; give a finite level")
-        boundary = self._boundary(float(value))
+        boundary = self._boundary(checked_level(value))
         return estimate(draw_beyond(self.process, boundary, self._random(1), self.draws), boundary)
+
+    def upcrossing_rate(self, level: float) -> xr.DataArray:
+        """Return Rice's rate at which a level is passed outward, (time,), of a response that is differentiable.
+
+        Parameters
+        ----------
+        level : float
+            In the unit of the response.
+
+        Returns
+        -------
+        xarray.DataArray
+            s^-1. Attributes: ``start_probability`` of being beyond it at the begin of the window, and
+            ``probability_bound``, that and the integral of the rate: flights pass the level no more often.
+
+        Raises
+        ------
+        ParameterValueError
+            The level is no finite number.
+        NotDifferentiableError
+            White noise reaches the rate of the response, whose variance is infinite.
+        """
+        return upcrossing_rate(self.of, checked_level(level), self.sides)
 
     def number_of(self, probability: float | None) -> int:
         """Return the number of a probability among those asked for.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from ...model.errors import AscentwindError, AscentwindWarning, ParameterValueError
@@ -24,6 +25,22 @@ class CertainPassageWarning(AscentwindWarning):
 
 class UncheckedStationsWarning(AscentwindWarning):
     """A limit over stations ends before the vehicle does, and what lies beyond it is not looked at."""
+
+
+def checked_level(value: float) -> float:
+    """Return a level as a number.
+
+    Raises
+    ------
+    ParameterValueError
+    """
+    try:
+        level = float("nan") if isinstance(value, str | bool) else float(value)
+    except (TypeError, ValueError):
+        level = float("nan")
+    if not math.isfinite(level):
+        raise ParameterValueError(f"the chance of passing {value!r:.60} cannot be computed; give a finite level")
+    return level
 
 
 def checked_draws(draws: int, seed: int) -> None:

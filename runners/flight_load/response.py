@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from ..case.case import Case
+from ..solvers.markov_chain import MarkovChain
 from .process import OneOutput, one_output
 from .window import TOLERANCE, window_chain
 
@@ -48,7 +49,16 @@ class ResponseInWindow:
         """Return the same of a case with other parameter values."""
         return replace(self, case=self.case.with_parameters(changes))
 
+    @property
+    def number(self) -> int:
+        """Number of the response among the outputs."""
+        return self.case.system.output_index(self.response)
+
+    @property
+    def chain(self) -> MarkovChain:
+        """The states at the times at which paths are seen."""
+        return window_chain(self.case, self.window, self.steps, TOLERANCE)
+
     def _process(self, steps: int, halvings: int, tolerance: float, sources: Sequence[int] | None) -> OneOutput:
-        chain = window_chain(self.case, self.window, steps, tolerance)
-        row = self.case.system.output_index(self.response)
+        chain, row = window_chain(self.case, self.window, steps, tolerance), self.number
         return one_output(chain, chain.output[:, row], chain.mean[:, row], halvings, sources)
