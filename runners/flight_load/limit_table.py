@@ -47,17 +47,21 @@ class Limits:
         for axis, points in ((TIME, self.time), (STATION, self.station)):
             if points is None:
                 continue
-            if points.ndim != 1 or points.size < 2 or not (np.diff(points) > 0).all():
+            increasing = points.ndim == 1 and points.size >= 2 and np.isfinite(points).all()
+            if not (increasing and (np.diff(points) > 0).all()):
                 raise LimitError(f"a limit over {axis} needs two values of it or more, increasing", file=self.file)
         shape = tuple(1 if points is None else points.size for points in (self.time, self.station))
         if not self.values:
             raise LimitError("holds no limit; add a column such as 'bending_moment [N m]'", file=self.file)
         for name, values in self.values.items():
+            if name not in self.units:
+                raise LimitError(f"has no unit; give units={{'{name}': ...}}, its SI unit", file=self.file, column=name)
             if values.shape != shape:
                 raise LimitError(f"has shape {values.shape}, expected {shape}", file=self.file, column=name)
-            if not (values > 0).all():  # NaN too
+            sizes = (values > 0) & np.isfinite(values)
+            if not sizes.all():
                 raise LimitError(
-                    f"{values[~(values > 0)][0]:g} is no limit of a size; give positive values",
+                    f"{values[~sizes][0]:g} is no limit of a size; give positive values",
                     file=self.file,
                     column=name,
                 )
@@ -149,8 +153,8 @@ class Limits:
         ------
         LimitError
         """
-        columns = {name: np.asarray(column, float).reshape(-1, 1) for name, column in values.items()}
-        return Limits(np.asarray(time, float), None, columns, dict(units))
+        columns = {name: _numbers(name, column).reshape(-1, 1) for name, column in values.items()}
+        return Limits(_numbers(TIME, time), None, columns, dict(units))
 
     def of(self, response: str, unit: str, times: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the limit of a response at times and, where they are over stations, at their stations.
@@ -196,6 +200,20 @@ class Limits:
         return np.stack([np.interp(times, self.time, column) for column in values.T], axis=1)
 
 
+def limit_table(limits: str | Path | Limits) -> Limits:
+    """Return limits from a file or as they are.
+
+    Raises
+    ------
+    DataError, LimitError
+    """
+    if isinstance(limits, Limits):
+        return limits
+    if not isinstance(limits, str | Path):
+        raise LimitError(f"{limits!r:.60} is no table of limits; give a file or aw.Limits")
+    return Limits.read(limits)
+
+
 def limits_over_time(
     limit: str | Path | Limits | float, response: str, unit: str, window: tuple[float, float]
 ) -> Limits:
@@ -208,16 +226,22 @@ def limits_over_time(
     """
     if isinstance(limit, bool) or not isinstance(limit, str | Path | Limits | float | int):
         raise LimitError(f"{limit!r:.60} is no limit; give a file, a table of limits or a number in [{unit}]")
-    if isinstance(limit, str | Path):
-        limit = Limits.read(limit)
-    elif not isinstance(limit, Limits):
+    if isinstance(limit, float | int):
         limit = Limits.constant(float(limit), response, unit)
+    limit = limit_table(limit)
     if limit.station is not None:
         raise LimitError(
             "is over stations of the structure; ask with Study.limit_passage, which takes them jointly", file=limit.file
         )
     limit.of(response, unit, np.array(window))
     return limit
+
+
+def _numbers(name: str, values: ArrayLike) -> NDArray[np.float64]:
+    try:
+        return np.asarray(values, float)
+    except (TypeError, ValueError):
+        raise LimitError(f"{values!r:.60} are no numbers", column=name) from None
 
 
 def _refuse_gaps(table: CsvTable, points: dict[str, NDArray[np.float64]]) -> None:

@@ -14,7 +14,7 @@ from ..case.case import Case
 from ..solvers.markov_chain import MarkovChain
 from ..station_loads.loads_along_vehicle import LOADS, SAME_STATION, load_rows
 from ..statistics.percentiles import Sides, checked_probabilities, checked_sides
-from .limit_table import LimitError, Limits
+from .limit_table import LimitError, Limits, limit_table
 from .passage import LimitedLoad, Passage
 from .process import ManyOutputs
 from .request import UncheckedStationsWarning, checked_draws, refuse_without_variance
@@ -38,7 +38,7 @@ def limit_passage(
     checked_draws(draws, seed)
     (design,) = checked_probabilities(probability)
     chosen, flown = checked_sides(sides), checked_window(case, window)
-    table = limits if isinstance(limits, Limits) else Limits.read(limits)
+    table = limit_table(limits)
     _refuse_unknown(case, table)
     for name in table.values:
         table.of(name, _unit(case, table, name), np.array(flown))
