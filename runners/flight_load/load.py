@@ -212,6 +212,12 @@ class FlightLoad:
         errors = [found.probability.spacing_error for found in self.levels]
         return self._array(errors, "relative error of the probability by the grid of times", unit="1")
 
+    @property
+    def spacing_missed(self) -> float:
+        """The largest of these errors without what may be the draws' own noise."""
+        found = [level.probability for level in self.levels]
+        return max(each.spacing_error - each.spacing_noise for each in found)
+
     def probability(self, value: float) -> Estimate:
         """Return the probability that the flight's maximum passes a value.
 
@@ -392,10 +398,11 @@ class FlightLoad:
         """
         system, share, without = self.of.case.system, [], []
         count = len(system.sources)
-        alone = [self.of.process([k]).covariance for k in range(count)]
+        alone = [self.of.process([k]) for k in range(count)]
         for which in range(len(self.probabilities)):
             moved = movement(self.process, self.levels[which], self._random(5, which), 2 * self.draws)
-            part = np.array([moved.change(np.zeros_like(moved.mean), covariance) for covariance in alone])
+            still = np.zeros_like(moved.mean)
+            part = np.array([moved.change(still, one.covariance, one.drawn.diffusion[:, 0] ** 2) for one in alone])
             share.append(part / part.sum())
         size_of = {"both": np.abs, "upper": np.asarray, "lower": np.negative}[self.sides]
         for number in range(count):
@@ -487,9 +494,8 @@ def flight_load(
     limits = None if limit is None else limits_over_time(limit, name, asked_of.unit, flown)
     load = FlightLoad(asked_of, asked, checked_sides(sides), draws, seed, limits)
     refuse_without_variance(name, load.process)
-    while float(load.spacing_error.max()) > SPACING_ERROR and load.of.steps < MOST_STEPS:
+    while (missed := load.spacing_missed) > SPACING_ERROR and load.of.steps < MOST_STEPS:
         load = replace(load, of=replace(load.of, steps=2 * load.of.steps))
-    missed = float(load.spacing_error.max())
     if missed > SPACING_ERROR:
         text = (
             f"the grid of {load.of.steps} steps still misses about {100 * missed:.2g} % of the probability that "

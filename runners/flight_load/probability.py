@@ -32,6 +32,8 @@ class Estimate:
         From the number of draws.
     spacing_error : float
         Relative; what the grid of times still misses, estimated from half as many points.
+    spacing_noise : float
+        Standard error of that, from the number of draws.
     largest_instant, sum_of_instants : float
         Bounds that cost nothing: the largest probability of a single point, side and output on the grid drawn, and the
         sum of all of them.
@@ -40,6 +42,7 @@ class Estimate:
     value: float
     standard_error: float
     spacing_error: float
+    spacing_noise: float
     largest_instant: float
     sum_of_instants: float
 
@@ -53,12 +56,15 @@ class Estimate:
 def estimate(draws: Draws, boundary: Boundary) -> Estimate:
     """Return the probability of passing a boundary from draws beyond it, or beyond one nearer."""
     found = draws.contributions(boundary)
-    value, coarser = float(found.mean()), float(draws.coarser_contributions(boundary).mean())
+    missed = found - draws.coarser_contributions(boundary)
+    value, root = float(found.mean()), np.sqrt(found.size)
+    left = 1 / value / (2**ORDER - 1) if value > 0 else 0.0
     instants = np.exp(instant_probabilities(draws.process, boundary.at(slice(None, None, draws.process.stride))))
     return Estimate(
         min(value, 1.0),
-        float(found.std(ddof=1) / np.sqrt(found.size)),
-        abs(value - coarser) / value / (2**ORDER - 1) if value > 0 else 0.0,
+        float(found.std(ddof=1) / root),
+        float(abs(missed.mean()) * left),
+        float(missed.std(ddof=1) / root * left),
         float(instants.max()),
         float(instants.sum()),
     )

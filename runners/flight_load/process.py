@@ -246,7 +246,7 @@ def one_output(
         Numbers of those that act; all without it.
     """
     P = chain.covariance(sources)
-    seen = Grid(chain.times, mean[:, None], _diffusion(row[:, None] @ chain.noise_matrix))
+    seen = Grid(chain.times, mean[:, None], _diffusion(row[:, None] @ chain.acting_noise_matrix(sources)))
     stride = 2**halvings
     at = slice(None, None, stride)
     drawn = Grid(seen.times[at], seen.mean[at], seen.diffusion[at])

@@ -81,8 +81,8 @@ def _along_paths(of: ResponseInWindow, moved: Movement, name: str) -> float:
     value = of.case.parameters[name].value
     step = STEP * abs(value) or STEP**2
     ends = [of.with_parameters({name: value + sign * step}).drawn_process(TOLERANCE) for sign in (1.0, -1.0)]
-    mean = ends[0].drawn.mean[:, 0] - ends[1].drawn.mean[:, 0]
-    return moved.change(0.5 * mean / step, 0.5 * (ends[0].covariance - ends[1].covariance) / step)
+    moments = ([end.drawn.mean[:, 0], end.covariance, end.drawn.diffusion[:, 0] ** 2] for end in ends)
+    return moved.change(*((more - less) / (2 * step) for more, less in zip(*moments, strict=True)))
 
 
 def _envelope(of: ResponseInWindow, level: Level, parameters: Iterable[str] | None) -> tuple[list[float], xr.DataArray]:

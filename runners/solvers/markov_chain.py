@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from ...codegen.sweep.integrator import CompiledSweep
 from ...codegen.system.evaluation import MatrixEvaluator
 from ...codegen.system.executable import ExecutableSystem
+from ...model.system.linear_system import LinearSystem
 from .discretisation import exact_steps
 from .sweep import flight_segments, longest_segment, swept
 from .time_nodes import intervals
@@ -41,6 +42,8 @@ class MarkovChain:
         A; on a discontinuity from the left, as the next ones.
     noise_matrix : (m, n, noises) array
         B.
+    noise_source : (noises,) array of int
+        Number of the source that each noise belongs to.
     output : (m, n_y, n) array
         C.
     mean : (m, n_y) array
@@ -53,6 +56,7 @@ class MarkovChain:
     start: NDArray[np.float64]
     state_matrix: NDArray[np.float64]
     noise_matrix: NDArray[np.float64]
+    noise_source: NDArray[np.intp]
     output: NDArray[np.float64]
     mean: NDArray[np.float64]
 
@@ -66,6 +70,12 @@ class MarkovChain:
         for Phi, Q in zip(self.transition, self.added[:, acting].sum(axis=1), strict=True):
             P.append(Phi @ P[-1] @ Phi.T + Q)
         return np.array(P)
+
+    def acting_noise_matrix(self, sources: Sequence[int] | None = None) -> NDArray[np.float64]:
+        """Return the columns of B of some sources by number or of all, (m, n, noises of theirs)."""
+        if sources is None:
+            return self.noise_matrix
+        return self.noise_matrix[:, :, np.isin(self.noise_source, list(sources))]
 
     def part(self, points: slice) -> MarkovChain:
         """Return the chain over consecutive times."""
@@ -81,6 +91,7 @@ class MarkovChain:
             start,
             self.state_matrix[points],
             self.noise_matrix[points],
+            self.noise_source,
             self.output[points],
             self.mean[points],
         )
@@ -122,7 +133,7 @@ def chain_by_sweep(
             transition[step] = transition[step] @ found.transition[k]
     A, B, output, direct = _matrices(executable, times)
     mean = np.where(at[:, None] < 0, direct, found.mean[at])
-    return MarkovChain(times, transition, added, P, A, B, output, mean)
+    return MarkovChain(times, transition, added, P, A, B, _noise_source(system), output, mean)
 
 
 def chain_by_exact_steps(executable: ExecutableSystem, times: NDArray[np.float64], substep: float) -> MarkovChain:
@@ -146,7 +157,11 @@ def chain_by_exact_steps(executable: ExecutableSystem, times: NDArray[np.float64
     for Phi, b, C, G in zip(transition, steps.forced * steps.scale, output, direct, strict=True):
         state = Phi @ state + b
         mean.append(C @ state + G)
-    return MarkovChain(times, transition[1:], added[1:], P, A, B, output, np.array(mean))
+    return MarkovChain(times, transition[1:], added[1:], P, A, B, _noise_source(system), output, np.array(mean))
+
+
+def _noise_source(system: LinearSystem) -> NDArray[np.intp]:
+    return np.array([system.sources.index(noise.source) for noise in system.noises], np.intp)
 
 
 def _matrices(executable: ExecutableSystem, times: NDArray[np.float64]) -> list[NDArray[np.float64]]:
