@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from ...model.errors import AscentwindError
-from .request import Sides
+from ..statistics.percentiles import Sides
 from .response import ResponseInWindow
 
 
