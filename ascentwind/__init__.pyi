@@ -6,6 +6,9 @@ from .runners.construct.build_vehicle import build_vehicle as build_vehicle
 from .runners.design.design import design as design
 from .runners.flight_load.limit_table import Limits as Limits
 from .runners.flight_load.load import FlightLoad as FlightLoad
+from .runners.gusts.shapes import OneMinusCosine as OneMinusCosine
+from .runners.gusts.shapes import QuasiSquare as QuasiSquare
+from .runners.gusts.shapes import RampAndHold as RampAndHold
 from .runners.parameter_study.run import run_parameter_study as run_parameter_study
 from .runners.statistics.covariance import CovarianceEquation as CovarianceEquation
 from .runners.statistics.cvodes import Cvodes as Cvodes

@@ -48,6 +48,7 @@ __getattr__, __dir__, __all__ = _lazy.attach(
             "UncheckedStationsWarning",
         ],
         "runners.flight_load.upcrossings": ["NotDifferentiableError"],
+        "runners.gusts.shapes": ["GustError"],
         "runners.parameter_study.cluster": ["SchedulerError"],
         "runners.parameter_study.sampling": ["UnbalancedSampleWarning"],
         "runners.parameter_study.store": ["ResumeError"],

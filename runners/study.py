@@ -18,6 +18,9 @@ from .flight_load.limit_table import Limits
 from .flight_load.limits import limit_passage
 from .flight_load.load import DESIGN, DRAWS, FlightLoad, flight_load
 from .flight_load.passage import Passage
+from .gusts.response import gust_response
+from .gusts.search import GustSweep, gust_sweep
+from .gusts.shapes import Gust, OneMinusCosine
 from .sensitivity.check import check_sensitivity
 from .sensitivity.many import sensitivities
 from .sensitivity.one import sensitivity
@@ -370,6 +373,69 @@ class Study(Case):
             A limit lies below a mean.
         """
         return limit_passage(self, limits, window, probability, sides, draws, seed)
+
+    def gust_response(
+        self,
+        gust: Gust,
+        start_altitude: float,
+        times: Iterable[float],
+        *,
+        responses: Iterable[str] | None = None,
+    ) -> xr.Dataset:
+        """Return what a discrete gust alone puts into responses, over time.
+
+        Parameters
+        ----------
+        gust : OneMinusCosine, QuasiSquare or RampAndHold
+        start_altitude : float
+            Where it starts, m.
+        times : iterable of float
+            s; zero before the vehicle meets it.
+        responses : iterable of str, optional
+            All without it.
+
+        Returns
+        -------
+        xarray.Dataset
+            ``response_to_gust`` (time, response).
+
+        Raises
+        ------
+        GustError, TimeRangeError, UnknownNameError, NoVehicleError, DataError, IntegrationError
+        """
+        return gust_response(self, gust, start_altitude, times, responses)
+
+    def gust_sweep(
+        self,
+        gust: Gust | None = None,
+        times: Iterable[float] | None = None,
+        *,
+        responses: Iterable[str] | None = None,
+        lengths: Iterable[float] | None = None,
+    ) -> GustSweep:
+        """Return the responses to discrete gusts of all lengths that start at all altitudes.
+
+        Parameters
+        ----------
+        gust : OneMinusCosine, QuasiSquare or RampAndHold, optional
+            The shape, of which the length is varied; a full wave of 9 m/s without it.
+        times : iterable of float, optional
+            End times t2, s; 21 of the vehicle's default times without it.
+        responses : iterable of str, optional
+            All without it.
+        lengths : iterable of float, optional
+            m, along altitude; 60 to 300 m without it.
+
+        Returns
+        -------
+        GustSweep
+            ``dataset`` over (time, response, length); ``worst(response)`` located between the points.
+
+        Raises
+        ------
+        GustError, TimeRangeError, UnknownNameError, NoVehicleError, DataError, IntegrationError
+        """
+        return gust_sweep(self, gust or OneMinusCosine(), times, responses, lengths)
 
     def sensitivity(
         self,

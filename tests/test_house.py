@@ -18,7 +18,7 @@ FLOORS = (
     ("runners.case", "runners.wind", "runners.construct"),
     ("runners.statistics",),
     ("runners.sensitivity", "runners.station_loads"),
-    ("runners.flight_load",),
+    ("runners.flight_load", "runners.gusts"),
     ("runners.study",),
     ("runners.design", "runners.parameter_study", "runners.views"),
     ("runners.reproduction",),

@@ -12,6 +12,7 @@ from typer.core import TyperGroup
 FILES = {  # command: its file in this folder, where a function or a group of that name stands
     "run": "run",
     "flight-load": "flight_load",
+    "gust": "gust",
     "verify": "checks",
     "tolerance": "checks",
     "sensitivity": "sensitivity",

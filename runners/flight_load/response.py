@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from ..case.case import Case
+from ..case.chain import TOLERANCE
 from ..solvers.markov_chain import MarkovChain
 from .process import OneOutput, one_output
-from .window import TOLERANCE, window_chain
+from .window import window_chain
 
 HALVINGS = 2  # from the grid of which paths are drawn to the one on which they are seen
 

@@ -7,13 +7,10 @@ from numpy.typing import NDArray
 
 from ...model.errors import TimeRangeError
 from ..case.case import Case
+from ..case.chain import TOLERANCE, chain_at
 from ..case.times import parse_times, seconds
-from ..solvers.markov_chain import MarkovChain, chain_by_exact_steps, chain_by_sweep
-from ..solvers.sweep import available_sweep
+from ..solvers.markov_chain import MarkovChain
 from ..solvers.time_nodes import time_nodes
-
-TOLERANCE = 1e-6  # relative, of the sweep
-SUBSTEP = 0.01  # s, of exact steps where nothing is compiled
 
 
 def checked_window(case: Case, window: tuple[float, float] | None) -> tuple[float, float]:
@@ -56,14 +53,10 @@ def window_chain(
 
 
 def _chain(case: Case, times: NDArray[np.float64], relative_tolerance: float) -> MarkovChain:
-    executable = case.with_means
-    nodes = np.unique(time_nodes(executable, times))
+    nodes = np.unique(time_nodes(case.with_means, times))
     if nodes.size < times.size:
         raise TimeRangeError(
             f"a window of {times[-1] - times[0]:g} s at {times[0]:g} s is too short for {times.size - 1} steps; "
             "ask for a longer one"
         )
-    engine = available_sweep(case.executable)
-    if engine is None:
-        return chain_by_exact_steps(executable, nodes, SUBSTEP)
-    return chain_by_sweep(engine, executable, nodes, relative_tolerance)
+    return chain_at(case, nodes, relative_tolerance)

@@ -158,6 +158,40 @@ def exact_steps(
     return ExactSteps(scale, transition, added, forced, np.array(C), np.array(direct))
 
 
+def exact_transitions(executable: ExecutableSystem, pieces: Sequence[Interval]) -> NDArray[np.float64]:
+    """Return the transition matrix over each of several short pieces of flight that hold no jump, (k, n, n).
+
+    Parameters
+    ----------
+    executable : ExecutableSystem
+    pieces : sequence of Interval
+        Each a step, halved where the state matrix is not nearly linear over it.
+
+    Raises
+    ------
+    IntegrationError
+    """
+    scale = _balanced_scales(executable)
+    n = scale.size
+    found = np.tile(np.eye(n), (len(pieces), 1, 1))
+    leaves = _leaves(MatrixEvaluator(executable, ("A", "B", "E", "inputs")), list(pieces), scale, np.inf, True)
+    while batch := list(islice(leaves, TOGETHER)):
+        wide = np.array([leaf.span for leaf in batch])[:, None, None]
+        first, second = (np.array([leaf.M[side, :n, :n] for leaf in batch]) for side in (0, 1))
+        exponent = 0.5 * wide * (first + second) + np.sqrt(3) / 12 * wide**2 * (second @ first - first @ second)
+        norm = np.abs(exponent).sum(axis=1).max()
+        doublings = max(0, int(np.ceil(np.log2(max(norm, 1e-12) / LARGEST_NORM))))
+        Phi = _exponential(exponent / 2**doublings, np.eye(n))
+        for _ in range(doublings):
+            Phi = Phi @ Phi
+        for leaf, step in zip(batch, Phi, strict=True):
+            found[leaf.piece] = step @ found[leaf.piece]
+    if not np.isfinite(found).all():
+        at = pieces[int(np.argmin(np.isfinite(found).all(axis=(1, 2))))]
+        raise IntegrationError(f"the transition from {at.begin:g} s left the range of numbers")
+    return found * (scale[:, None] / scale)
+
+
 def _balanced_scales(executable: ExecutableSystem) -> NDArray[np.float64]:
     """Return scales of the states that make the state matrix small, so that exponentials need few squarings."""
     system, scale = executable.system, state_scales(executable.system)
@@ -237,7 +271,7 @@ def _leaves(
 
     made = 0
     for number, piece in enumerate(pieces):
-        count = 2 ** max(0, int(np.ceil(np.log2((piece.end - piece.begin) / substep) - 1e-9)))
+        count = 2 ** max(0, int(np.ceil(np.log2(max(1.0, (piece.end - piece.begin) / substep)) - 1e-9)))
         edges = np.linspace(piece.begin, piece.end, count + 1)
         waiting = list(pairwise(edges.tolist()))[::-1]
         while waiting:

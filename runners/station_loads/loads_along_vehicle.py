@@ -53,6 +53,8 @@ class LoadRows:
         C, over the states of the case's own system.
     direct_mean : (k, s) array
         What does not pass through the states: the mean wind without delay, and the axial force of the mean flight.
+    direct : (k, s, n_u) array
+        G, of the known inputs of the case's own system.
     unit : str
         Of the load.
     """
@@ -62,6 +64,7 @@ class LoadRows:
     forward_of_gimbal: Array
     state: Array
     direct_mean: Array
+    direct: Array
     unit: str
 
 
@@ -106,14 +109,16 @@ def load_rows(
     evaluate = MatrixEvaluator(executable, ("C", "G", "inputs"))
     matrices = [evaluate(float(node), here.low, here.high) for node, here in zip(nodes, sides, strict=True)]
     state = np.array([C[outputs] for C, _, _ in matrices])
-    direct = np.array([(G @ inputs)[outputs, 0] for _, G, inputs in matrices])
+    direct = np.array([G[outputs] for _, G, _ in matrices])
+    known = np.array([inputs[:, 0] for _, _, inputs in matrices])
     rows = along.rows[:, chosen]
     return LoadRows(
         at,
         along.station[chosen],
         along.forward_of_gimbal[chosen],
         np.einsum("tsc,tcn->tsn", rows, state),
-        np.einsum("tsc,tc->ts", rows, direct) + along.constant[:, chosen],
+        np.einsum("tsc,tcu,tu->ts", rows, direct, known) + along.constant[:, chosen],
+        np.einsum("tsc,tcu->tsu", rows, direct),
         LOADS[load],
     )
 

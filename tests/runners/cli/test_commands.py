@@ -33,6 +33,7 @@ TAKE_CHANGES = [
     ["sensitivity", "as504"],
     ["mean", "as504"],
     ["flight-load", "as504"],
+    ["gust", "as504"],
     ["inspect", "as504", "--time", "70"],
     ["equations"],
     ["regenerate", "as504"],

@@ -73,6 +73,7 @@ KNOWN = {
     "flight-load": {
         "window", "response", "probability", "limit", "sides", "sensitivity", "draws", "seed", "out", "changes",
     },
+    "gust": {"shape", "response", "amplitude", "length", "times", "out", "changes"},
     "vehicles": set(),
     "new-vehicle": {"source"},
     "inspect": {"time", "json", "changes"},

@@ -1,0 +1,1 @@
+"""Discrete gusts: shapes, responses by weighting functions, the worst of them, and their place beside other loads."""

@@ -1,0 +1,68 @@
+"""A load along the vehicle in gusts: in the one that is worst at one place, and the largest at every station."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+
+from ...model.system.names import WIND
+from ...model.vehicle.loads import BENDING_MOMENT
+from ..case.provenance import provenance
+from ..station_loads.loads_along_vehicle import load_rows
+from .response import described, gust_products
+from .search import AFTER, GustSweep, WorstGust
+from .weights import weights_of_rows
+
+
+def gust_along_vehicle(
+    sweep: GustSweep, worst: WorstGust, load: str = BENDING_MOMENT, *, slosh_reaction: bool = True
+) -> xr.Dataset:
+    """Return a load over (station) at the time of a worst gust.
+
+    Parameters
+    ----------
+    sweep : GustSweep
+    worst : WorstGust
+        One of the sweep's.
+    load : str
+        Bending moment, shear force, axial force or equivalent axial load.
+    slosh_reaction : bool
+        Whether the whole vehicle answers slosh, without which the moment does not vanish at the tail.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``in_worst_gust`` of that gust, and ``envelope``, the largest size of any gust of the sweep's lengths, with its
+        ``length`` and ``start_altitude``.
+
+    Raises
+    ------
+    DataError, UnknownNameError, IntegrationError
+    """
+    case, climb = sweep.case, sweep.climb
+    rows = load_rows(case, [worst.time], load=load, slosh_reaction=slosh_reaction)
+    wind = case.system.input_names.index(WIND)
+    reach = max(worst.time - worst.time_met, sweep.longest + AFTER)
+    weights = weights_of_rows(case, [worst.time], [(rows.state[0], rows.direct[0, :, wind])], reach)[0]
+    own = gust_products(weights, climb, worst.gust, np.array([worst.start_altitude]))[0]
+    starts = sweep.starts(weights)
+    found = np.array([gust_products(weights, climb, sweep.gust.of_length(L), starts) for L in sweep.lengths])
+    flat = np.abs(found).reshape(-1, found.shape[2])
+    best = flat.argmax(axis=0)
+    q, p = np.unravel_index(best, found.shape[:2])
+    units = {"units": rows.unit}
+    return xr.Dataset(
+        {
+            "in_worst_gust": ("station", own, units | {"long_name": f"in the gust that is worst for {worst.response}"}),
+            "envelope": ("station", flat.max(axis=0), units | {"long_name": "largest size in any gust"}),
+            "length": ("station", sweep.lengths[q], {"units": "m", "long_name": "length of that gust"}),
+            "start_altitude": ("station", starts[p], {"units": "m", "long_name": "altitude at which it starts"}),
+        },
+        {
+            "station": ("station", rows.station, {"units": "m", "long_name": "vehicle station"}),
+            "forward_of_gimbal": ("station", rows.forward_of_gimbal, {"units": "m"}),
+        },
+        provenance(case)
+        | described(worst.gust)
+        | {"load": load, "time_s": worst.time, "slosh_reaction": str(slosh_reaction).lower()},
+    )

@@ -1,0 +1,145 @@
+"""The response to gusts: the product of their wind with the weights, integrated piece by piece."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from itertools import pairwise
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from ..case.case import Case
+from ..case.climb import Climb
+from ..case.provenance import provenance
+from ..case.times import end_times
+from ..present.netcdf import RULE
+from .shapes import Gust, GustError
+from .weights import WindWeights, wind_weights
+
+# s and points of the weights, at most, of a panel in which the product is integrated as a polynomial of degree 11
+PANEL, POINTS = 0.05, 10
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(6)
+
+
+def gust_products(weights: WindWeights, climb: Climb, gust: Gust, starts: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return what a gust that starts at each of several altitudes puts into the quantities of the weights.
+
+    Parameters
+    ----------
+    weights : WindWeights
+    climb : Climb
+    gust : Gust
+    starts : (p,) array
+        m; not met before the weights begin.
+
+    Returns
+    -------
+    (p, r) array
+    """
+    corners = climb.time_at(starts[:, None] + np.array(gust.corners))
+    if gust.holds:
+        corners = np.append(corners, np.full((starts.size, 1), weights.time), axis=1)
+    found = np.zeros((starts.size, weights.direct.size))
+    for spline, low, high in zip(weights.pieces, weights.edges[:-1], weights.edges[1:], strict=True):
+        cut = np.clip(corners, low, high)
+        for begin, end in pairwise(cut.T):
+            found += _integral(spline, climb, gust, starts, begin, end)
+    now = gust.at(climb.altitude(weights.time) - starts)
+    return found + now[:, None] * weights.direct
+
+
+def _integral(spline, climb: Climb, gust: Gust, starts: NDArray, begin: NDArray, end: NDArray) -> NDArray:
+    """Return the integral of wind times weights from begin to end (s), (p, r), where both are smooth."""
+    met = np.flatnonzero(end > begin)
+    if not met.size:
+        return np.zeros((starts.size, spline.c.shape[1]))
+    begin, span = begin[met], (end - begin)[met]
+    panel = min(PANEL, POINTS * float(np.diff(spline.t).max()))
+    panels = max(1, int(np.ceil(float(span.max()) / panel - 1e-9)))
+    offsets = ((np.arange(panels)[:, None] + 0.5 * (1 + NODES)) / panels).ravel()
+    times = begin[:, None] + span[:, None] * offsets
+    wind = gust.at(climb.altitude(times) - starts[met, None]) * np.tile(0.5 / panels * WEIGHTS, panels)
+    found = np.zeros((starts.size, spline.c.shape[1]))
+    found[met] = span[:, None] * np.matmul(wind[:, None, :], spline(times))[:, 0]
+    return found
+
+
+def check_on_flight(climb: Climb, length: float, start: float | None = None) -> None:
+    """Raise if a gust (m) is longer than the flight, or starts (m) where the flight is not.
+
+    Raises
+    ------
+    GustError
+    """
+    low, high = float(climb.altitudes[0]), float(climb.altitudes[-1])
+    if length > high - low:
+        raise GustError(
+            f"a gust of {length:g} m is longer than the flight, which climbs from {low:.6g} to {high:.6g} m; make it "
+            "shorter"
+        )
+    if start is None:
+        return
+    if not np.isfinite(start):
+        raise GustError(f"a gust cannot start at {start!r} m; give an altitude")
+    if start < low:
+        where = "below the ground" if start < 0 else "below the start of the flight"
+        raise GustError(f"the gust starts at {start:g} m, {where}: flight begins at {low:.6g} m; let it start there")
+    if start >= high:
+        raise GustError(
+            f"the gust starts at {start:g} m, above the end of the flight at {high:.6g} m, and is never met"
+        )
+
+
+def gust_response(
+    case: Case, gust: Gust, start_altitude: float, times: Iterable[float], responses: Iterable[str] | None
+) -> xr.Dataset:
+    """See :meth:`Study.gust_response`."""
+    climb = Climb.of(case)
+    check_on_flight(climb, gust.length, start_altitude)
+    ends, names = case.checked_times(end_times(times)), checked_responses(case, responses)
+    met = float(climb.time_at(start_altitude))
+    found = np.zeros((len(ends), len(names)))
+    after = [k for k, time in enumerate(ends) if time > met]
+    if after:
+        weights = wind_weights(case, [ends[k] for k in after], names, ends[-1] - met)
+        start = np.array([float(start_altitude)])
+        found[after] = [gust_products(each, climb, gust, start)[0] for each in weights]
+    units = [case.system.outputs[case.system.output_index(name)].unit for name in names]
+    return xr.Dataset(
+        {
+            "response_to_gust": (
+                ("time", "response"),
+                found,
+                {RULE: "response", "long_name": "response to the gust alone"},
+            )
+        },
+        {
+            "time": ("time", ends, {"units": "s", "long_name": "flight time"}),
+            "response": names,
+            "unit": ("response", units),
+        },
+        provenance(case) | described(gust) | {"start_altitude_m": float(start_altitude)},
+    )
+
+
+def described(gust: Gust) -> dict[str, object]:
+    """Return a gust in words and numbers, for the attributes of a result."""
+    found: dict[str, object] = {"gust": gust.name, "amplitude_m_s": gust.amplitude, "length_m": gust.length}
+    edge = getattr(gust, "edge", None)
+    return found if edge is None else found | {"edge_m": edge}
+
+
+def checked_responses(case: Case, responses: Iterable[str] | None) -> list[str]:
+    """Return names of responses, each once; all for None. White noise that reaches one directly does not matter here.
+
+    Raises
+    ------
+    UnknownNameError
+    """
+    if isinstance(responses, str):
+        responses = [responses]
+    names = list(case.system.output_names if responses is None else dict.fromkeys(responses))
+    for name in names:
+        case.system.output_index(name)
+    return names
