@@ -14,6 +14,7 @@ from ..model.errors import IntegrationError, ParameterValueError
 from ..model.system.names import COMBINED
 from .case.case import Case
 from .case.times import end_times
+from .design_wind.design_wind import DesignWind, design_wind
 from .flight_load.limit_table import Limits
 from .flight_load.limits import limit_passage
 from .flight_load.load import DESIGN, DRAWS, FlightLoad, flight_load
@@ -373,6 +374,46 @@ class Study(Case):
             A limit lies below a mean.
         """
         return limit_passage(self, limits, window, probability, sides, draws, seed)
+
+    def design_wind(
+        self,
+        response: str | FlightLoad,
+        time: float | None = None,
+        *,
+        sigmas: float = 3.0,
+        combined: bool = False,
+    ) -> DesignWind:
+        """Return the most likely wind over altitude that makes a load.
+
+        Parameters
+        ----------
+        response : str or FlightLoad
+            With a flight's load: the wind behind its first level, at the time at which flights most likely pass it,
+            combined; leave the others out.
+        time : float, optional
+            t2, s.
+        sigmas : float
+            k of the load mean + k sigma. Negative for the other side; zero is the mean wind.
+        combined : bool
+            False: sigma of the wind alone, whose profile makes all of the load. True: sigma of all sources; the
+            profile makes the wind's share, ``deviations`` of the vehicle the rest.
+
+        Returns
+        -------
+        DesignWind
+            ``profile``, ``load``, ``draws(count)`` of winds that make the load, ``write(path)``.
+
+        Raises
+        ------
+        UnknownNameError, TimeRangeError, ParameterValueError, DirectNoiseError, NoVarianceError, NoVehicleError
+        DataError, IntegrationError
+
+        Notes
+        -----
+        E[w(h) | y] = mean + cov(w(h), y) (L - E[y]) / Var[y], with a corner at h(t2). Of all histories of the filter's
+        white noise that make the load it is that of least norm, k.
+        """
+        return design_wind(self, response, time, sigmas, combined)
 
     def gust_response(
         self,

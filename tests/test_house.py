@@ -19,6 +19,7 @@ FLOORS = (
     ("runners.statistics",),
     ("runners.sensitivity", "runners.station_loads"),
     ("runners.flight_load", "runners.gusts"),
+    ("runners.design_wind",),
     ("runners.study",),
     ("runners.design", "runners.parameter_study", "runners.views"),
     ("runners.reproduction",),

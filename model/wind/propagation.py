@@ -6,13 +6,13 @@ import itertools
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import expm
 
 from ..errors import DataError
 from .shaping_filter import ShapingFilter
 
 SPACING = 250.0  # m, at most, of the steps, which end at the filter's samples
 GAUSS = 0.5 / np.sqrt(3.0)
+LARGEST_NORM, TERMS = 0.5, 14  # of an exponent whose series is summed, which leaves less than a rounding
 
 
 def divided(altitude: NDArray[np.float64], spacing: float) -> list[NDArray[np.float64]]:
@@ -36,9 +36,24 @@ def transitions(shaping_filter: ShapingFilter, edges: NDArray[np.float64]) -> tu
         block[:, :n, :n], block[:, :n, n:], block[:, n:, n:] = F, G @ G.swapaxes(1, 2), -F.swapaxes(1, 2)
         blocks.append(block)
     first, second = blocks
-    exponential = expm(0.5 * step * (first + second) + np.sqrt(3) / 12 * step**2 * (second @ first - first @ second))
+    exponential = exponentials(
+        0.5 * step * (first + second) + np.sqrt(3) / 12 * step**2 * (second @ first - first @ second)
+    )
     phi = exponential[:, :n, :n]
     return phi, exponential[:, :n, n:] @ phi.swapaxes(1, 2)
+
+
+def exponentials(X: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return e^X of many small matrices (k, n, n) at once, by Taylor's series, halvings and squares."""
+    norm = float(np.abs(X).sum(axis=2).max(initial=0.0))
+    halvings = max(0, int(np.ceil(np.log2(norm / LARGEST_NORM)))) if np.isfinite(norm) and norm > 0 else 0
+    part, one = X / 2.0**halvings, np.eye(X.shape[1])
+    found = one + part / TERMS
+    for k in range(TERMS - 1, 0, -1):
+        found = one + part @ found / k
+    for _ in range(halvings):
+        found = found @ found
+    return found
 
 
 def standard_deviation(shaping_filter: ShapingFilter, altitude: ArrayLike) -> NDArray[np.float64]:
