@@ -22,6 +22,7 @@ __getattr__, __dir__, __all__ = _lazy.attach(
         "runners.statistics.covariance": ["CovarianceEquation"],
         "runners.statistics.cvodes": ["Cvodes"],
         "runners.statistics.ensemble": ["Ensemble"],
+        "runners.statistics.norm": ["NormOfNormal"],
         "runners.statistics.results": ["ResponseStatistics"],
         "runners.statistics.sweep": ["Sweep"],
         "runners.study": ["Study"],

@@ -13,6 +13,7 @@ from .runners.parameter_study.run import run_parameter_study as run_parameter_st
 from .runners.statistics.covariance import CovarianceEquation as CovarianceEquation
 from .runners.statistics.cvodes import Cvodes as Cvodes
 from .runners.statistics.ensemble import Ensemble as Ensemble
+from .runners.statistics.norm import NormOfNormal as NormOfNormal
 from .runners.statistics.results import ResponseStatistics as ResponseStatistics
 from .runners.statistics.sweep import Sweep as Sweep
 from .runners.study import Study as Study
