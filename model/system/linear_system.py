@@ -291,8 +291,9 @@ class LinearSystem:
         """
         rows, columns = self.D.sparsity().row(), self.D.sparsity().get_col()
         for name in outputs:
+            which = self.output_index(name)
             for row, column in zip(rows, columns, strict=True):
-                if row == self.output_index(name) and not self.D[row, column].is_zero():
+                if row == which and not self.D[row, column].is_zero():
                     raise DirectNoiseError(
                         f"white noise of source '{self.noises[column].source}' reaches '{name}' directly, so that its "
                         "variance is infinite; colour the noise (white = false with a correlation time) or leave the "

@@ -53,16 +53,23 @@ def flight_load(
     from ..flight_load.exceedance_figure import exceedance_figure
     from ..flight_load.files import write_flight_loads, write_passage, write_sensitivities
     from ..flight_load.limit_table import Limits
+    from ..flight_load.limits import checked_limits
     from ..flight_load.load import DESIGN
     from ..flight_load.margin_figure import margin_figure
+    from ..flight_load.request import NoVarianceError, checked_draws
+    from ..flight_load.window import checked_window
     from ..present.style import words, write_figure
     from ..statistics.percentiles import checked_probabilities, checked_sides
 
     asked, chosen = checked_probabilities(probability or [DESIGN]), checked_sides(sides)
     flown = None if window is None else parse_window(window)
     limits = None if limit is None else Limits.read(limit)
+    checked_draws(draws, seed)
     study = load_study(vehicle, changes, ["title", "default_times"] if window is None else ["title"])
     names = study.checked_responses(response or None)
+    flown = checked_window(study, flown)
+    if limits is not None:
+        checked_limits(study, limits, flown)
     over_time = limits if limits is not None and limits.station is None else None
     if over_time is not None and not set(over_time.values) & set(names):
         raise UnusedOptionError(f"{limit} holds no limit of {', '.join(names)}; it has {', '.join(over_time.values)}")
@@ -72,9 +79,14 @@ def flight_load(
     with steps("loads of the flight", len(names)) as bar:
         for name in names:
             own = over_time if over_time is not None and name in over_time.values else None
-            load = study.flight_load(name, flown, asked, limit=own, sides=chosen, draws=draws, seed=seed)
-            _ = load.exceedance, load.time_of_maximum, load.shares
-            loads.append(load)
+            try:
+                load = study.flight_load(name, flown, asked, limit=own, sides=chosen, draws=draws, seed=seed)
+                _ = load.exceedance, load.time_of_maximum, load.shares
+                loads.append(load)
+            except NoVarianceError as error:
+                if response or own is not None or (name == names[-1] and not loads):
+                    raise
+                console.print(f"Left out: {error}", style="dim", soft_wrap=True, markup=False)
             bar.done(words(name))
     passage = None
     if limits is not None and (over_time is None or len(over_time.values) > 1):

@@ -45,7 +45,9 @@ def capability_figure(passage: Passage, title: str) -> Figure:
             panels[-1].semilogy(station[of], shown, marker=".", label=words(name))
         whole = passage.probability.value
         panels[-1].axhline(whole, color="black", lw=1.4, ls="--", label=f"any of them: {whole:.2g}")
-        panels[-1].set(xlabel="vehicle station (m)", ylabel="chance in a flight", ylim=(whole * 1e-4, whole * 3))
+        panels[-1].set(xlabel="vehicle station (m)", ylabel="chance in a flight")
+        if whole > 0:
+            panels[-1].set_ylim(whole * 1e-4, whole * 3)
         panels[-1].legend(fontsize=9)
         figure.suptitle(wrapped(title))
     return figure

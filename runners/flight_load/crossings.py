@@ -117,7 +117,7 @@ class Sightings:
         """
         sides = [np.stack(self._gaps(boundary, side), axis=1) for side in (0, 1)]
         gaps = np.stack(sides, axis=3)  # (k, ends, r, sides)
-        flat = gaps.reshape(len(gaps), -1)
+        flat = gaps.reshape(len(gaps), int(np.prod(gaps.shape[1:])))
         place = flat.argmin(axis=1)
         order = np.lexsort((flat[np.arange(place.size), place], self.path))
         numbers, first = np.unique(self.path[order], return_index=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from numbers import Real
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from ...model.files.csv_table import CsvTable, read_csv_table, read_rows
 
 TIME, STATION = "time", "station"
 ARGUMENTS = {TIME: "s", STATION: "m"}
+NO_LIMIT = "{:g} is no limit of a size; give positive numbers"
 
 
 class LimitError(DataError):
@@ -58,13 +60,9 @@ class Limits:
                 raise LimitError(f"has no unit; give units={{'{name}': ...}}, its SI unit", file=self.file, column=name)
             if values.shape != shape:
                 raise LimitError(f"has shape {values.shape}, expected {shape}", file=self.file, column=name)
-            sizes = (values > 0) & np.isfinite(values)
-            if not sizes.all():
-                raise LimitError(
-                    f"{values[~sizes][0]:g} is no limit of a size; give positive values",
-                    file=self.file,
-                    column=name,
-                )
+            wrong = values[_unusable(values)]
+            if wrong.size:
+                raise LimitError(NO_LIMIT.format(wrong[0]), file=self.file, column=name)
 
     @staticmethod
     def read(file: str | Path) -> Limits:
@@ -99,8 +97,9 @@ class Limits:
         table = read_csv_table(
             file, first, ARGUMENTS[first], order="increasing" if len(axes) == 1 else "not decreasing"
         )
-        points: dict[str, NDArray[np.float64]] = {a: np.unique(table.column(a, ARGUMENTS[a])) for a in axes}
         names = [name for name in table.columns if name not in ARGUMENTS]
+        _refuse_values(table, names)
+        points: dict[str, NDArray[np.float64]] = {a: np.unique(table.column(a, ARGUMENTS[a])) for a in axes}
         shape = tuple(points[axis].size if axis in points else 1 for axis in ARGUMENTS)
         if len(axes) == 2:
             _refuse_gaps(table, points)
@@ -130,7 +129,7 @@ class Limits:
         ------
         LimitError
         """
-        return Limits(None, None, {response: np.array([[float(value)]])}, {response: unit})
+        return Limits(None, None, {response: _numbers(value, response).reshape(1, 1)}, {response: unit})
 
     @staticmethod
     def over_time(time: ArrayLike, values: Mapping[str, ArrayLike], units: Mapping[str, str]) -> Limits:
@@ -224,9 +223,9 @@ def limits_over_time(
     DataError, UnknownNameError, LimitError, TimeRangeError
         They are over stations, or do not hold over the window.
     """
-    if isinstance(limit, bool) or not isinstance(limit, str | Path | Limits | float | int):
+    if isinstance(limit, bool) or not isinstance(limit, str | Path | Limits | Real):
         raise LimitError(f"{limit!r:.60} is no limit; give a file, a table of limits or a number in [{unit}]")
-    if isinstance(limit, float | int):
+    if isinstance(limit, Real):
         limit = Limits.constant(float(limit), response, unit)
     limit = limit_table(limit)
     if limit.station is not None:
@@ -237,11 +236,24 @@ def limits_over_time(
     return limit
 
 
+def _unusable(values: NDArray[np.float64]) -> NDArray[np.bool_]:
+    return ~((values > 0) & np.isfinite(values))
+
+
 def _numbers(name: str, values: ArrayLike) -> NDArray[np.float64]:
     try:
         return np.asarray(values, float)
     except (TypeError, ValueError):
         raise LimitError(f"{values!r:.60} are no numbers", column=name) from None
+
+
+def _refuse_values(table: CsvTable, names: list[str]) -> None:
+    collector = DataErrorCollector()
+    for name in names:
+        for k in np.flatnonzero(_unusable(table.columns[name])):
+            why = NO_LIMIT.format(table.columns[name][k])
+            collector.errors.append(LimitError(why, file=table.file, column=name, row=table.lines[k]))
+    collector.raise_all()
 
 
 def _refuse_gaps(table: CsvTable, points: dict[str, NDArray[np.float64]]) -> None:

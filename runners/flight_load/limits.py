@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ...model.errors import UnknownNameError
+from ...model.errors import DataErrorCollector, suggestion
 from ..case.case import Case
 from ..solvers.markov_chain import MarkovChain
-from ..station_loads.loads_along_vehicle import LOADS, SAME_STATION, load_rows
+from ..station_loads.loads_along_vehicle import LOADS, SAME_STATION, load_rows, vehicle_stations
 from ..statistics.percentiles import Sides, checked_probabilities, checked_sides
 from .limit_table import LimitError, Limits, limit_table
 from .passage import LimitedLoad, Passage
@@ -38,10 +38,7 @@ def limit_passage(
     checked_draws(draws, seed)
     (design,) = checked_probabilities(probability)
     chosen, flown = checked_sides(sides), checked_window(case, window)
-    table = limit_table(limits)
-    _refuse_unknown(case, table)
-    for name in table.values:
-        table.of(name, _unit(case, table, name), np.array(flown))
+    table = checked_limits(case, limits, flown)
     states = window_chain(case, flown, STEPS)
     rows_of = _output_row if table.station is None else _station_rows
     loads, rows, means, given = zip(*(rows_of(case, table, states, name) for name in table.values), strict=True)
@@ -51,13 +48,52 @@ def limit_passage(
     return Passage(case, tuple(chain.from_iterable(loads)), process, limit, chosen, design, draws, seed)
 
 
-def _refuse_unknown(case: Case, table: Limits) -> None:
+def checked_limits(case: Case, limits: str | Path | Limits, window: tuple[float, float]) -> Limits:
+    """Return limits that a case can be held against over a window.
+
+    Parameters
+    ----------
+    case : Case
+    limits : path or Limits
+    window : (float, float)
+        s.
+
+    Raises
+    ------
+    DataError, TimeRangeError, DirectNoiseError
+    """
+    table = limit_table(limits)
     known = list(case.system.output_names) if table.station is None else list(LOADS)
+    what = "response" if table.station is None else "load along the vehicle"
+    collector = DataErrorCollector()
     for name in table.values:
         if name not in known:
-            raise UnknownNameError("load at a station" if table.station is not None else "response", name, known)
+            why = f"there is no such {what}{suggestion(name, known)}"
+            collector.errors.append(LimitError(why, file=table.file, column=name))
+            continue
+        with collector.part():
+            table.of(name, _unit(case, table, name), np.array(window))
+            if table.station is not None:
+                _inside(case, table, name)
+    collector.raise_all()
     if table.station is None:
         case.checked_responses(table.values)
+    return table
+
+
+def _inside(case: Case, table: Limits, name: str) -> NDArray[np.bool_]:
+    """Return which of the vehicle's stations lie within those of the table."""
+    found, stations = vehicle_stations(case, name), table.station
+    assert stations is not None
+    inside = (found >= stations[0] - SAME_STATION) & (found <= stations[-1] + SAME_STATION)
+    if not inside.any():
+        raise LimitError(
+            f"ends at stations {stations[0]:g} and {stations[-1]:g} m, between which the vehicle has no station; its "
+            f"stations go from {found[0]:g} to {found[-1]:g} m",
+            file=table.file,
+            column="station",
+        )
+    return inside
 
 
 def _unit(case: Case, table: Limits, name: str) -> str:
@@ -76,14 +112,7 @@ def _station_rows(case: Case, table: Limits, states: MarkovChain, name: str) -> 
     found = load_rows(case, states.times.tolist(), load=name)
     limit, stations = table.of(name, LOADS[name], states.times), table.station
     assert stations is not None
-    inside = (found.station >= stations[0] - SAME_STATION) & (found.station <= stations[-1] + SAME_STATION)
-    if not inside.any():
-        raise LimitError(
-            f"ends at stations {stations[0]:g} and {stations[-1]:g} m, between which the vehicle has no station; its "
-            f"stations go from {found.station[0]:g} to {found.station[-1]:g} m",
-            file=table.file,
-            column="station",
-        )
+    inside = _inside(case, table, name)
     if not inside.all():
         text = (
             f"the limit of {name.replace('_', ' ')} is given from station {stations[0]:g} to {stations[-1]:g} m: "

@@ -161,6 +161,17 @@ def known_loads(vehicle: Vehicle) -> tuple[str, ...]:
     return tuple(load for load in LOADS if have.issuperset(_tables(load)))
 
 
+def vehicle_stations(case: Case, load: str) -> Array:
+    """Return the stations at which a load is known, m.
+
+    Raises
+    ------
+    DataError, UnknownNameError
+    """
+    vehicle = case.vehicle_for(f"the {_words(load)} along the vehicle")
+    return [load_station_loads(vehicle, table).station for table in _tables(load)][0]
+
+
 def every_load_along_vehicle(
     case: Case,
     times: Iterable[float],
