@@ -169,7 +169,8 @@ def vehicle_stations(case: Case, load: str) -> Array:
     DataError, UnknownNameError
     """
     vehicle = case.vehicle_for(f"the {_words(load)} along the vehicle")
-    return [load_station_loads(vehicle, table).station for table in _tables(load)][0]
+    parts = [load_station_loads(vehicle, table) for table in _tables(load)]
+    return parts[0].station
 
 
 def every_load_along_vehicle(
