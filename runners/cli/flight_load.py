@@ -268,7 +268,7 @@ def print_passage(passage: Passage) -> None:
     console.print(table)
     console.print(
         f"Any of {len(passage.loads)} limits is passed by {p.value:.3g} of flights (95 %: {p.interval[0]:.2g} to "
-        f"{p.interval[1]:.2g}), jointly; the worst single instant would say {p.largest_instant:.2g}, adding the limits' "
+        f"{p.interval[1]:.2g}), jointly; the worst single instant would say {p.largest_instant:.2g}, adding the "
         f"chances {chance.sum():.2g}. At {passage.design:g} the margin of safety is {passage.margin_of_safety:+.3f}.",
         highlight=False,
         soft_wrap=True,
