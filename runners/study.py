@@ -366,12 +366,14 @@ class Study(Case):
 
         Raises
         ------
-        DataError, UnknownNameError, TimeRangeError, ParameterValueError, DirectNoiseError, NoVarianceError
+        LimitError, DataError, TimeRangeError, ParameterValueError, UnknownNameError, DirectNoiseError, NoVarianceError
 
         Warns
         -----
         CertainPassageWarning
             A limit lies below a mean.
+        UncheckedStationsWarning
+            The vehicle has stations outside those of the table.
         """
         return limit_passage(self, limits, window, probability, sides, draws, seed)
 

@@ -40,7 +40,7 @@ def capability_figure(passage: Passage, title: str) -> Figure:
             instant = f"passed with {passage.design:g} at an instant"
             axes.plot(station[of], factor * level[of], color=COLORS["combined"], lw=2, marker=".", label=instant)
             axes.set(ylabel=f"{words(name)} ({unit})", ylim=(0, None))
-            axes.legend(fontsize=9)
+            axes.legend(fontsize=9, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
             shown = np.where(chance[of] > 0, chance[of], np.nan)
             panels[-1].semilogy(station[of], shown, marker=".", label=words(name))
         whole = passage.probability.value
