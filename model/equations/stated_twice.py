@@ -98,11 +98,11 @@ def _compare_modes(vehicle: Vehicle, name: str, along: StationLoads) -> None:
 
     def around(column: str, at: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return how much less of a coefficient lies forward of the near end than of the far one."""
-        ends = [
-            [np.interp(x + side, place, row) for x, row in zip(at, columns[column], strict=True)]
+        near, far = (
+            np.array([np.interp(x + side, place, row) for x, row in zip(at, columns[column], strict=True)])
             for side in (-reach, reach)
-        ]
-        return np.subtract(*ends)
+        )
+        return near - far
 
     for i in range(1, len(vehicle.bending) + 1):
         file, inertia = vehicle.folder / vehicle.file.bending[i - 1].table.file, f"bending_{i}"

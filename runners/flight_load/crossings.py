@@ -150,7 +150,7 @@ def _largest(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _any(values: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    return values[:, 0] if values.shape[1] == 1 else values.any(axis=1)
+    return values[:, 0] if values.shape[1] == 1 else np.any(values, axis=1, keepdims=True)[:, 0]
 
 
 def sightings(count: int, steps: Steps, boundary: Boundary, grid: Grid, every: int = 1) -> Sightings:

@@ -76,7 +76,8 @@ def movement(process: OneOutput, level: Level, random: np.random.Generator, coun
     rough = squared > 0
     deviations *= np.where(rough, 1.0, away / np.where(rough, 1.0, seen))[:, None]  # smooth: it reaches it, not more
     beyond = np.divide(share * (away - seen), 2 * squared, out=np.zeros(share.size), where=rough)
-    variance_rate = np.bincount(nearest, beyond, process.drawn.times.size)
+    variance_rate = np.zeros(process.drawn.times.size)
+    np.add.at(variance_rate, nearest, beyond)
     place = interpolated * (sign * share)[:, None]
     std = np.where(process.std[:, 0] > 0, process.std[:, 0], 1.0)
     correlation = process.covariance / np.outer(std, std)

@@ -198,7 +198,7 @@ def _may_be_first(
     """
     close = drawn > bound - reach
     if not close.any():
-        return close.any(axis=2)
+        return close[:, :, 0]
     beyond = drawn - bound
     found = beyond >= beyond.max(axis=1, keepdims=True) - reach
     if (bound > 0).all():

@@ -90,7 +90,8 @@ def passing_of_ornstein_uhlenbeck(
     h = (upper - lower) / points
     x = lower + h * np.arange(1, points)
     generator = diags(
-        [(1 / h**2 + x / (2 * h))[1:], np.full(x.size, -2 / h**2), (1 / h**2 - x / (2 * h))[:-1]], [-1, 0, 1]
+        [(1 / h**2 + x / (2 * h))[1:], np.full(x.size, -2 / h**2), (1 / h**2 - x / (2 * h))[:-1]],
+        [-1, 0, 1],  # pyright: ignore[reportArgumentType]  # its stub knows one offset
     ).tocsc()
     one, dt = identity(x.size, format="csc"), end / steps
     stays = np.ones(x.size)

@@ -60,5 +60,5 @@ def test_levels_and_probabilities_are_those_of_simulated_flights(as504, flown, r
         level = largest[round((1 - p) * FLIGHTS) - 1]
         assert level == pytest.approx(grid.value, abs=4 * error / (p * grid.slope))
         # between points flights go farther, by a per cent of the level at most; both have their sampling error
-        apart = np.hypot(*(each.interval[1] - each.value for each in (grid, corrected)))
+        apart = float(np.hypot(grid.interval[1] - grid.value, corrected.interval[1] - corrected.value))
         assert -2 * apart < corrected.value - grid.value < 0.012 * grid.value + 2 * apart

@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from maxima import passing_of_ornstein_uhlenbeck
-from scipy.optimize import brentq
+from scipy.optimize import root_scalar
 from scipy.stats import norm
 
 from ascentwind.model import LinearSystem, define_system
@@ -37,7 +37,11 @@ def study() -> Study:
 
 def level_of_rate(rate: float, p: float) -> float:
     """Level of x alone by its own equation, in time measured in 1 / rate."""
-    return brentq(lambda u: np.log(passing_of_ornstein_uhlenbeck(-np.inf, u, rate * END) / p), 2.0, 5.0, xtol=1e-9)
+
+    def excess(u: float) -> float:
+        return np.log(passing_of_ornstein_uhlenbeck(-np.inf, u, rate * END) / p)
+
+    return float(root_scalar(excess, bracket=(2.0, 5.0), method="brentq", xtol=1e-9).root)
 
 
 @pytest.mark.slow

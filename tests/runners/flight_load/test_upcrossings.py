@@ -13,6 +13,7 @@ from ascentwind.model import define_system
 from ascentwind.model.errors import ParameterValueError
 from ascentwind.runners import Study
 from ascentwind.runners.flight_load.upcrossings import NotDifferentiableError
+from ascentwind.runners.statistics.percentiles import Sides
 
 OMEGA, DAMPING = 3.0, 0.1
 
@@ -46,7 +47,8 @@ def test_a_stationary_oscillator_has_the_rate_of_rice(u):
     """omega / (2 pi) exp(-u^2 / 2) of each side, from any damping."""
     study = oscillator()
     expected = OMEGA / (2 * np.pi) * np.exp(-(u**2) / 2)
-    for sides, count in (("upper", 1), ("lower", 1), ("both", 2)):
+    counts: dict[Sides, int] = {"upper": 1, "lower": 1, "both": 2}
+    for sides, count in counts.items():
         found = study.flight_load("y", (0.0, 10.0), 0.1, sides=sides, draws=200).upcrossing_rate(u)
         np.testing.assert_allclose(found, count * expected, rtol=1e-5)
         assert found.attrs["start_probability"] == pytest.approx(count * norm.sf(u), rel=1e-9)
@@ -92,7 +94,7 @@ def test_a_narrow_band_is_crossed_in_clumps_and_bounded_all_the_same():
 @pytest.mark.parametrize("u", [float("nan"), float("inf"), "3", None, True, [1.0, 2.0], np.zeros(2)])
 def test_levels_that_are_none_are_refused(u):
     load = oscillator().flight_load("y", (0.0, 10.0), 0.1, draws=200)
-    assert load.probability(load.level[0]).value == load.probability(float(load.level[0])).value
+    assert load.probability(load.level[0].item()).value == load.probability(float(load.level[0])).value
     with pytest.raises(ParameterValueError, match="finite level"):
         load.upcrossing_rate(u)
     with pytest.raises(ParameterValueError, match="finite level"):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from two_noises import MEAN, two_noises
@@ -39,7 +41,8 @@ def test_what_cannot_be_known_is_refused(cache):
     assert load.wind_samples is None
     with pytest.raises(ParameterValueError, match=r"not known; give samples=.*wind.record"):
         load.wind_interval()
-    for samples, confidence in ((1, 0.95), (float("nan"), 0.95), ("many", 0.95), (80, 1.0)):
+    refused: list[tuple[Any, float]] = [(1, 0.95), (float("nan"), 0.95), ("many", 0.95), (80, 1.0)]
+    for samples, confidence in refused:
         with pytest.raises(ParameterValueError):
             load.wind_interval(samples, confidence)
     other = two_noises(2.0, 1.0, name="gust").flight_load("y", WINDOW, [0.01])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from scipy.stats import chi2, nct
@@ -58,7 +60,8 @@ def test_what_cannot_be_known_is_refused(cache):
     found = statistics()
     with pytest.raises(ParameterValueError, match=r"not known; give samples=.*wind.record"):
         found.sampling_interval("y", TIME)
-    for samples in (1, 0, -4, float("nan"), float("inf"), "many"):
+    refused: list[Any] = [1, 0, -4, float("nan"), float("inf"), "many"]
+    for samples in refused:
         with pytest.raises(ParameterValueError):
             found.sampling_interval("y", TIME, samples)
     for more in ({"confidence": 1.0}, {"confidence": float("nan")}, {"sigmas": -1.0}, {"sigmas": float("inf")}):
