@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -139,6 +140,12 @@ def test_nobody_takes_underscore_names_of_another_file():
 def test_runners_are_rooms():
     flat = [p.name for p in (PACKAGE / "runners").glob("*.py")]
     assert sorted(flat) == ["__init__.py", "study.py"]
+
+
+def test_files_of_tests_have_names_of_their_own():
+    """pytest imports them by their bare names."""
+    names = Counter(file.name for file in Path(__file__).parent.rglob("test_*.py"))
+    assert [name for name, count in names.items() if count > 1] == []
 
 
 def test_rooms_say_what_they_are():

@@ -245,7 +245,9 @@ def test_problems_that_make_no_sense_are_refused(lag, changes, error, message):
 
 
 @pytest.mark.parametrize(
-    ("old", "successor"), [("verify_design", recompute_peaks), ("Verification", RecomputedPeak)], ids=str
+    ("old", "successor"),
+    [("verify_design", recompute_peaks), ("Verification", RecomputedPeak)],
+    ids=["function", "class"],
 )
 def test_an_old_name_is_its_successor_and_warns_once(old, successor):
     warn_deprecated.cache_clear()
