@@ -129,7 +129,7 @@ class Limits:
         ------
         LimitError
         """
-        return Limits(None, None, {response: _numbers(value, response).reshape(1, 1)}, {response: unit})
+        return Limits(None, None, {response: _numbers(response, value).reshape(1, 1)}, {response: unit})
 
     @staticmethod
     def over_time(time: ArrayLike, values: Mapping[str, ArrayLike], units: Mapping[str, str]) -> Limits:

@@ -212,7 +212,7 @@ def test_limits_over_stations_of_what_has_none(cache, vehicle_folder, tmp_path):
 
 @pytest.mark.parametrize("limits", [5.0, None, ["a"], {"bending_moment": 3e7}])
 def test_what_is_no_table_of_limits(as504, limits):
-    with pytest.raises(LimitError, match="give a file or a table"):
+    with pytest.raises(LimitError, match="give a file or aw.Limits"):
         as504.limit_passage(limits)
 
 

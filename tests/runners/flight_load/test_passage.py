@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import casadi as ca
 import numpy as np
 import pytest
@@ -71,7 +69,7 @@ def over(**values: float) -> aw.Limits:
     return aw.Limits.over_time([0.0, 10.0], columns, UNITS)
 
 
-def passage(study: Study, draws: int = 2000, seed: int = 1, sides: Sides = "both", **values: Any):
+def passage(study: Study, values: dict[str, float], draws: int = 2000, seed: int = 1, sides: Sides = "both"):
     return study.limit_passage(over(**values), WINDOW, DESIGN, sides=sides, draws=draws, seed=seed)
 
 
@@ -86,7 +84,7 @@ def same(one, other, expected: float | None = None) -> None:
 @pytest.mark.parametrize("limit", [2.5, 4.5])
 def test_many_outputs_are_as_one(pair, sides, limit):
     one = pair.flight_load("sum", WINDOW, limit=over(sum=limit), sides=sides, draws=2000).passage
-    other = passage(pair, sum=limit, sides=sides)
+    other = passage(pair, {"sum": limit}, sides=sides)
     same(one.probability, other.probability)
     assert other.margin_of_safety == pytest.approx(one.margin_of_safety, abs=0.02)
     np.testing.assert_allclose(other.level.sel(time=3.0), one.level.sel(time=3.0), rtol=1e-6)
@@ -138,7 +136,7 @@ def test_deviations_have_those_covariances(small):
 def test_constants_have_their_closed_form(pair):
     """A constant of a flight passes with 2 (1 - Phi(u / sigma)); two of them with 1 - (1 - P1) (1 - P2)."""
     first, second = 2 * norm.sf(2.0 / 2.0), 2 * norm.sf(0.8)
-    found = passage(pair, draws=1000, still=2.0, idle=0.8)
+    found = passage(pair, {"still": 2.0, "idle": 0.8}, draws=1000)
     same(found.probability, None, 1 - (1 - first) * (1 - second))
     np.testing.assert_allclose(found.by_load, [first, second], rtol=0.08)
     assert found.probability.value < 0.9 * (first + second)
@@ -149,8 +147,8 @@ def test_constants_have_their_closed_form(pair):
 
 
 def test_independent_outputs_multiply_what_they_keep(pair):
-    one, other = (passage(pair, **{name: limit}).probability for name, limit in (("x", 1.6), ("y", 1.5)))
-    both = passage(pair, x=1.6, y=1.5).probability
+    one, other = (passage(pair, {name: limit}).probability for name, limit in (("x", 1.6), ("y", 1.5)))
+    both = passage(pair, {"x": 1.6, "y": 1.5}).probability
     expected = 1 - (1 - one.value) * (1 - other.value)
     error = np.hypot(both.standard_error, np.hypot(one.standard_error, other.standard_error))
     assert abs(both.value - expected) < 4 * error
@@ -158,49 +156,49 @@ def test_independent_outputs_multiply_what_they_keep(pair):
 
 
 def test_an_output_and_its_double_pass_together(pair):
-    one, both = passage(pair, x=2.0), passage(pair, x=2.0, double=4.0, minus=2.0)
+    one, both = passage(pair, {"x": 2.0}), passage(pair, {"x": 2.0, "double": 4.0, "minus": 2.0})
     same(one.probability, both.probability)
     np.testing.assert_allclose(both.by_load, both.probability.value, rtol=1e-9)
     assert both.factor.value == pytest.approx(one.factor.value, rel=0.01)
 
 
 def test_upward_of_an_output_and_its_negative_is_both_sides(pair):
-    same(passage(pair, x=2.0, minus=2.0, sides="upper").probability, passage(pair, x=2.0).probability)
+    same(passage(pair, {"x": 2.0, "minus": 2.0}, sides="upper").probability, passage(pair, {"x": 2.0}).probability)
     lower, upper = (
-        passage(pair, x=2.0, sides="lower").probability,
-        passage(pair, minus=2.0, sides="upper").probability,
+        passage(pair, {"x": 2.0}, sides="lower").probability,
+        passage(pair, {"minus": 2.0}, sides="upper").probability,
     )
     same(lower, upper)
 
 
 def test_bounds_and_single_outputs(pair):
     values = {"x": 2.2, "y": 2.4, "sum": 3.4}
-    found = passage(pair, **values)
+    found = passage(pair, values)
     p, each = found.probability, found.by_load.values
     assert p.largest_instant < each.max() < p.value < each.sum() < p.sum_of_instants
     for name, chance in zip(values, each, strict=True):
-        alone = passage(pair, **{name: values[name]}).probability
+        alone = passage(pair, {name: values[name]}).probability
         assert chance == pytest.approx(alone.value, abs=5 * np.hypot(alone.standard_error, p.standard_error))
     assert float(found.by_time.sum()) * np.diff(WINDOW)[0] / 60 == pytest.approx(p.value, rel=1e-9)
 
 
 @pytest.mark.parametrize("c", [0.5, 3.0])
 def test_the_factor_scales_with_the_limits(pair, c):
-    found = passage(pair, x=2.0, y=2.5)
-    scaled = passage(pair, x=2.0 * c, y=2.5 * c)
+    found = passage(pair, {"x": 2.0, "y": 2.5})
+    scaled = passage(pair, {"x": 2.0 * c, "y": 2.5 * c})
     assert scaled.factor.value == pytest.approx(found.factor.value / c, rel=1e-6)
     assert 1 + scaled.margin_of_safety == pytest.approx(c * (1 + found.margin_of_safety), rel=1e-6)
 
 
 def test_limits_times_the_factor_are_passed_with_the_design_probability(pair):
-    f = passage(pair, x=2.0, y=2.5).factor
-    again = passage(pair, x=2.0 * f.value, y=2.5 * f.value, seed=99)
+    f = passage(pair, {"x": 2.0, "y": 2.5}).factor
+    again = passage(pair, {"x": 2.0 * f.value, "y": 2.5 * f.value}, seed=99)
     error = np.hypot(again.probability.standard_error, f.probability.standard_error)
     assert abs(again.probability.value - DESIGN) < 4 * error < 0.3 * DESIGN
 
 
 def test_limits_that_nothing_comes_near(pair):
-    found = passage(pair, x=1e3, y=1e3)
+    found = passage(pair, {"x": 1e3, "y": 1e3})
     assert found.probability.value < 1e-300
     assert not found.by_time.any()
     assert found.margin_of_safety > 100
