@@ -13,6 +13,7 @@ __getattr__, __dir__, __all__ = _lazy.attach(
         "model.system.define": ["define_system"],
         "model.system.linear_system": ["LinearSystem"],
         "model.vehicle.reader": ["load_vehicle"],
+        "model.wind.soundings.read": ["read_profiles", "read_soundings"],
         "runners.construct.build_vehicle": ["build_vehicle"],
         "runners.design.design": ["design"],
         "runners.flight_load.limit_table": ["Limits"],

@@ -2,6 +2,8 @@ from . import errors as errors
 from .model.system.define import define_system as define_system
 from .model.system.linear_system import LinearSystem as LinearSystem
 from .model.vehicle.reader import load_vehicle as load_vehicle
+from .model.wind.soundings.read import read_profiles as read_profiles
+from .model.wind.soundings.read import read_soundings as read_soundings
 from .runners.construct.build_vehicle import build_vehicle as build_vehicle
 from .runners.design.design import design as design
 from .runners.flight_load.limit_table import Limits as Limits

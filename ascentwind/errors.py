@@ -38,6 +38,8 @@ __getattr__, __dir__, __all__ = _lazy.attach(
         ],
         "model.vehicle.noise_loads": ["NoiseLoadsWarning"],
         "model.wind.correlation_matrix": ["NotPositiveSemidefiniteError", "RepairWarning"],
+        "model.wind.soundings.grids": ["MissingLibraryError"],
+        "model.wind.soundings.sounding": ["SoundingError"],
         "runners.design.design": ["InfeasibleDesignError"],
         "runners.design.problem": ["DesignProblemError"],
         "runners.flight_load.limit_table": ["LimitError"],

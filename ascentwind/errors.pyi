@@ -32,6 +32,8 @@ from .model.errors import WindWarning as WindWarning
 from .model.vehicle.noise_loads import NoiseLoadsWarning as NoiseLoadsWarning
 from .model.wind.correlation_matrix import NotPositiveSemidefiniteError as NotPositiveSemidefiniteError
 from .model.wind.correlation_matrix import RepairWarning as RepairWarning
+from .model.wind.soundings.grids import MissingLibraryError as MissingLibraryError
+from .model.wind.soundings.sounding import SoundingError as SoundingError
 from .runners.design.design import InfeasibleDesignError as InfeasibleDesignError
 from .runners.design.problem import DesignProblemError as DesignProblemError
 from .runners.flight_load.limit_table import LimitError as LimitError

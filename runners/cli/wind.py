@@ -1,4 +1,4 @@
-"""The command line of the wind: ``ascentwind wind apply``, ``stats``, ``fit``, ``check``, ``plot`` and ``compare``."""
+"""The command line of the wind: ``ascentwind wind apply``, ``read``, ``stats``, ``fit``, ``check``, and so on."""
 
 from __future__ import annotations
 
@@ -12,18 +12,20 @@ from rich.table import Table
 from ...model.errors import DataError, OutputFolderError
 from ..present.terminal import console
 from .job import Job, load_study, steps
+from .soundings import read
 from .terminal import Changes, VehicleArgument, given, number, refuse_unused, whole
 
 if TYPE_CHECKING:
     from ...model.wind.shaping_filter import ShapingFilter
 
 wind = typer.Typer(no_args_is_help=True, help="Wind statistics, and filters that turn white noise into that wind.")
+wind.command()(read)
 
 Period = Annotated[str, typer.Option(help="Month in English, or annual.")]
 Component = Annotated[str, typer.Option(help="zonal or meridional.")]
 Edition = Annotated[str, typer.Option(help="Range Reference Atmosphere: 1983 or 2006.")]
 Top = Annotated[float, typer.Option(parser=number, help="Highest level, m.")]
-Soundings = Annotated[Path | None, typer.Option(help="CSV of soundings instead of the shipped tables.")]
+Soundings = Annotated[Path | None, typer.Option(help="Soundings at common levels instead of the shipped tables.")]
 Out = Annotated[Path, typer.Option(help="Folder for results.")]
 
 
@@ -43,7 +45,7 @@ def _statistics(
     from ...model.errors import UnknownNameError
     from ...model.wind.range_reference import shipped_statistics
     from ...model.wind.record import COMPONENTS
-    from ...model.wind.soundings import read_soundings
+    from ...model.wind.soundings.read import read_soundings
 
     if component not in COMPONENTS:
         raise UnknownNameError("wind component", component, COMPONENTS)
@@ -51,9 +53,10 @@ def _statistics(
         refuse_unused(context, ["site"], "without --soundings: the shipped tables are of Cape Canaveral")
         return shipped_statistics(period, component, edition=edition, top=top)
     refuse_unused(context, ["period", "edition"], "with --soundings, whose days the statistics are of")
-    read = read_soundings(soundings, drop_incomplete=True)
-    if read.dropped:
-        console.print(f"{read.dropped} incomplete profiles left out", style="dim")
+    read = read_soundings(soundings)
+    partly = int((~read.complete).sum())
+    if partly:
+        console.print(f"{partly} of {len(read.u)} profiles lack levels and count where they are", style="dim")
     found = getattr(read.statistics(soundings.stem, site), component)
     return found.between(-math.inf, top) if given(context, "top") else found
 

@@ -21,7 +21,7 @@ from ascentwind.model.wind.propagation import standard_deviation
 from ascentwind.model.wind.range_reference import range_reference, shipped_statistics
 from ascentwind.model.wind.record import WindOrigin, WindRecord
 from ascentwind.model.wind.shaping_filter import ShapingFilter
-from ascentwind.model.wind.soundings import read_soundings
+from ascentwind.model.wind.soundings.read import read_soundings
 from ascentwind.model.wind.statistics import REPORT_SAMPLES
 from ascentwind.runners.cli.app import app
 from ascentwind.runners.construct.build_vehicle import build_vehicle

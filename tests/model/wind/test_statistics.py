@@ -14,7 +14,8 @@ from ascentwind.model.wind.correlation_matrix import (
 )
 from ascentwind.model.wind.range_reference import PERIODS, interlevel_kernel, range_reference, shipped_statistics
 from ascentwind.model.wind.record import COMPONENTS
-from ascentwind.model.wind.soundings import day_to_day_correlation, independent_samples, read_soundings
+from ascentwind.model.wind.soundings.collection import independent_samples, successive_correlation
+from ascentwind.model.wind.soundings.read import read_soundings
 from ascentwind.model.wind.statistics import WindStatistics, report_standard_deviation, statistics_from_covariance
 from ascentwind.runners.wind.correlation_fit import kernel_correlations, measured_pairs, reconstructed_kernel
 from ascentwind.runners.wind.fitting.analytic_fits import fit_covariance, fit_deviation
@@ -143,7 +144,7 @@ def test_soundings_give_their_statistics_and_independent_samples(tmp_path):
     assert both.zonal.standard_deviation == pytest.approx([3, 3, 3], rel=0.05)
     assert both.cross_correlation is not None
     assert np.abs(both.cross_correlation).max() < 0.1
-    assert day_to_day_correlation(soundings.u, soundings.day) == pytest.approx([0.6] * 3, abs=0.05)
+    assert successive_correlation(soundings.u, soundings.day) == pytest.approx([0.6] * 3, abs=0.05)
     # first-order process of 0.6: (1 - .36) / (1 + .36) of the profiles
     assert both.zonal.independent_samples == pytest.approx(4000 * 0.64 / 1.36, rel=0.1)
 
@@ -163,7 +164,7 @@ def test_variance_of_a_persistent_process_is_as_uncertain_as_said():
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        ("u [m/s]", "u [kt]", "missing"),
+        ("u [m/s]", "u [mph]", r"'u' has the unit \[mph\], and units that are known make it 'u \[m/s\]', 'u \[kt\]'"),
         ("p3,2020-01-04,100,", "p3,2020-01-04,100,x", "not a finite number"),
         ("p3,2020-01-04", "p3,04/01/2020", "not a date"),
         ("p3,2020-01-04", '"p3,2020-01-04', "a line is a row of cells"),
@@ -185,10 +186,10 @@ def test_bad_soundings_are_refused(tmp_path, old, new, says):
 def test_missing_levels_are_refused_or_left_out(tmp_path):
     file = write_profiles(tmp_path / "s.csv", 20, drop=7)
     with pytest.raises(DataError, match="p7.*1000 m"):
-        read_soundings(file)
-    assert read_soundings(file, drop_incomplete=True).dropped == 1
+        read_soundings(file, incomplete="refuse")
+    assert len(read_soundings(file, incomplete="drop").quality.dropped) == 1
     with pytest.raises(DataError, match="at least"):
-        read_soundings(write_profiles(tmp_path / "few.csv", 4))
+        read_soundings(write_profiles(tmp_path / "few.csv", 4)).statistics("few")
 
 
 def test_real_soundings(tmp_path):
@@ -210,7 +211,7 @@ def test_real_soundings(tmp_path):
                     lines.append(f"{i},{date},{h},{float(u) * 0.514444},{float(v) * 0.514444}")
     file = tmp_path / "kxmr.csv"
     file.write_text("\n".join(lines))
-    both = read_soundings(file, drop_incomplete=True).statistics("march")
+    both = read_soundings(file, incomplete="drop").statistics("march")
     assert both.zonal.mean == pytest.approx([2.91, 7.64, 16.35, 32.80], abs=0.1)
     assert both.zonal.correlation[0] == pytest.approx([1, 0.772, 0.675, 0.465], abs=0.01)
     assert both.intralevel_correlation == pytest.approx([0.135, 0.169, 0.267, 0.277], abs=0.01)
@@ -233,10 +234,10 @@ def test_missing_value_codes_are_no_wind(tmp_path, code, share):
     ]
     file = tmp_path / "codes.csv"
     file.write_text("\n".join(with_codes) + "\n")
-    with pytest.raises(DataError, match=rf"missing-value codes.*{code:g} m/s at 1000 m \(line 3\)"):
-        read_soundings(file)
-    read = read_soundings(file, drop_incomplete=True)
-    assert read.dropped == len(spoilt)
+    with pytest.raises(DataError, match=rf"missing-value codes.*{code:g} m/s at 1000 m \(p0 of 2020-01-01, line 3\)"):
+        read_soundings(file, incomplete="refuse")
+    read = read_soundings(file, incomplete="drop")
+    assert len(read.quality.dropped) == len(spoilt)
     both, wanted = read.statistics("mine"), read_soundings(tmp_path / "clean.csv").statistics("mine")
     assert both.meridional.standard_deviation == pytest.approx(wanted.meridional.standard_deviation, rel=1e-12)
     assert both.meridional.standard_deviation == pytest.approx([2, 2, 2], rel=0.1)
@@ -257,16 +258,16 @@ def test_a_jet_of_99_metres_a_second_is_wind(tmp_path):
     values = np.random.default_rng(4).normal(70.0, 15.0, 400)
     values[[3, 50, 77]] = 99.0, 99.9, 115.0
     read = read_soundings(jet(tmp_path / "jet.csv", values))
-    assert read.dropped == 0
+    assert not read.quality.dropped
     assert read.u[:, 1].max() == 115.0
 
 
 @pytest.mark.parametrize(
     ("row", "value", "says"),
     [
-        (7, 160.0, r"no wind: 160 m/s at 9000 m \(line 17\)"),
+        (7, 160.0, r"no wind: 160 m/s at 9000 m \(7, line 17\)"),
         (7, -513.93, r"-513.93 m/s at 9000 m"),  # -999 knots
-        (7, 55.0, r"55 m/s at 9000 m \(line 17\)"),
+        (7, 55.0, r"55 m/s at 9000 m \(7, line 17\)"),
         (slice(0, 8), 55.0, r"and 3 more; correct them"),
     ],
 )
@@ -274,18 +275,18 @@ def test_outliers_are_refused_with_their_lines(tmp_path, row, value, says):
     values = np.random.default_rng(4).normal(0.0, 3.0, 400)
     values[row] = value
     with pytest.raises(DataError, match=says):
-        read_soundings(jet(tmp_path / "s.csv", values), drop_incomplete=True)
+        read_soundings(jet(tmp_path / "s.csv", values), incomplete="drop")
 
 
 def test_a_level_of_nothing_but_codes_and_altitudes_that_are_none(tmp_path):
-    with pytest.raises(DataError, match="holds 0 complete profiles"):
-        read_soundings(jet(tmp_path / "s.csv", np.full(50, 99.0)), drop_incomplete=True)
+    with pytest.raises(DataError, match="no profile holds all of the 2 levels"):
+        read_soundings(jet(tmp_path / "s.csv", np.full(50, 99.0)), incomplete="drop")
     file = jet(tmp_path / "s.csv", np.random.default_rng(4).normal(0.0, 3.0, 50))
     for wrong in ("-9999", "99999"):
         text = file.read_text().replace("7,9000,", f"7,{wrong},", 1)
         (tmp_path / "t.csv").write_text(text)
         with pytest.raises(DataError, match=f"{wrong} m is no altitude"):
-            read_soundings(tmp_path / "t.csv", drop_incomplete=True)
+            read_soundings(tmp_path / "t.csv", incomplete="drop")
 
 
 def test_tops_above_the_tables_are_refused():

@@ -32,6 +32,7 @@ UNUSED = [
     (APPLY, "--site is not used without --soundings"),
     ([*APPLY, *SOUNDINGS, "--period", "may"], "--period is not used with --soundings"),
     ([*APPLY, *SOUNDINGS, "--edition", "2006"], "--edition is not used with --soundings"),
+    (["wind", "read", "none.csv", "--point", "bilinear"], "--point is not used without --latitude"),
     (["equations", "as504", "--page", "p.md", "--of", "4-1"], "--of is not used with --page"),
     (["equations", "as504", "--page", "p.md", "--of", "4-1", "--by", "mass"], "not used with --page"),
     (["equations", "as504", "--by", "mass"], "--by mass needs --of"),
@@ -90,6 +91,10 @@ KNOWN = {
     "reproduce": {"out"},
     "build-vehicle": {"out", "figures", "spacing"},
     "wind apply": {"component", "azimuth", "sign", "period", "edition", "soundings", "site"},
+    "wind read": {
+        "levels", "months", "hours", "years", "latitude", "longitude", "point", "largest_gap", "incomplete", "outliers",
+        "out",
+    },
     "wind stats": {"period", "component", "edition", "top", "soundings"},
     "wind fit": {
         "period", "component", "edition", "top", "soundings", "method", "order", "noises", "time_limit", "out",
