@@ -395,7 +395,7 @@ class Study(Case):
         time : float, optional
             t2, s.
         sigmas : float
-            k of the load mean + k sigma. Negative for the other side; zero is the mean wind.
+            k of the load mean + k sigma, a factor. Negative for the other side; zero is the mean wind.
         combined : bool
             False: sigma of the wind alone, whose profile makes all of the load. True: sigma of all sources; the
             profile makes the wind's share, ``deviations`` of the vehicle the rest.

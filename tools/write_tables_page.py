@@ -35,6 +35,7 @@ TABLES: tuple[tuple[str, Sequence[c.Column]], ...] = (
     ("`[control.accelerometer.modes]`, `[control.angle_of_attack.modes]`", (c.TIME, *c.mode_columns(1))),
     ("`[control.accelerometer.schedule]`, `[control.angle_of_attack.schedule]`", (c.TIME, *c.SCHEDULE)),
     ("`[wind.statistics]`", (c.ALTITUDE, *c.WIND)),
+    ("`[wind.turbulence.intensity]`", (c.ALTITUDE, *c.TURBULENCE)),
 )
 
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import casadi as ca
 import numpy as np
 
 from ..system.labels import Noise, State, block_of
 from ..system.linear_system import LinearSystem
-from ..system.names import UNDISTURBED, WIND
+from ..system.names import TURBULENCE, UNDISTURBED, WIND
 from ..vehicle.biases import WIND_BIAS, check_biases
 from ..vehicle.vehicle import Vehicle
 from . import rigid_body
@@ -22,9 +22,10 @@ from .motion import Motion
 from .noise import NoiseProcess, deviation_block
 from .outputs import outputs
 from .structure import structure_in_words
+from .turbulence import start_covariance, turbulence_block
 from .typical_sizes import SCALES
 from .vehicle_numbers import Numbers
-from .wind import wind_block
+from .wind import WindBlock, wind_block
 
 
 def assemble(vehicle: Vehicle, wind_start_covariance: np.ndarray) -> LinearSystem:
@@ -45,11 +46,13 @@ def assemble(vehicle: Vehicle, wind_start_covariance: np.ndarray) -> LinearSyste
     numbers = Numbers.of(vehicle)
     motion, tables, deviations = Motion.of(numbers.modes, numbers.tanks), numbers.tables, numbers.deviations
     mean_wind, handles = ca.SX.sym("mean_wind"), Handles.new()
-    wind = wind_block(vehicle.wind.shaping_filter, tables, numbers.sigma_scale)
+    winds, start = _winds(vehicle, numbers), {WIND: ca.SX(ca.DM(wind_start_covariance))}
+    if vehicle.turbulence and numbers.turbulence:
+        start[TURBULENCE] = start_covariance(vehicle.turbulence, numbers.turbulence)
     solved = solved_motion(vehicle, numbers, motion, handles)
     control = control_law(numbers, motion, solved)
     expected = numbers.mean_scale * tables["wind.mean"]
-    met = wind.wind + mean_wind
+    met = sum((part.wind for part in winds.values()), ca.SX(0)) + mean_wind
     if WIND_BIAS in deviations:
         met += deviations[WIND_BIAS].deviation * expected
     alpha = rigid_body.angle_of_attack(tables, motion.attitude, motion.lateral_velocity, met)
@@ -58,7 +61,7 @@ def assemble(vehicle: Vehicle, wind_start_covariance: np.ndarray) -> LinearSyste
         *control.blocks,
         *_bending(motion, solved),
         *_slosh(motion, solved, numbers.tanks),
-        Block.numbered(WIND, wind.states, wind.derivative),
+        *(Block.numbered(source, part.states, part.derivative) for source, part in winds.items()),
         *(deviation_block(name, process) for name, process in deviations.items()),
         *_position(vehicle, motion),
     ]
@@ -79,20 +82,20 @@ def assemble(vehicle: Vehicle, wind_start_covariance: np.ndarray) -> LinearSyste
         name=vehicle.name,
         time=numbers.time,
         x=x,
-        w=ca.vertcat(wind.white, *(process.white for process in deviations.values())),
+        w=ca.vertcat(*(part.white for part in winds.values()), *(process.white for process in deviations.values())),
         u=ca.vertcat(mean_wind, numbers.undisturbed) if has_axial else mean_wind,
         p=numbers.parameters.vector,
         v=tables.vector,
         derivative=derivative,
         output=output,
         states=states,
-        noises=_white_noises(wind.white.numel(), deviations),
+        noises=_white_noises(winds, deviations),
         outputs=tuple(label for label, _ in responses),
         parameters=tuple(numbers.parameters.parameters),
         input_names=(WIND, UNDISTURBED) if has_axial else (WIND,),
         input_values=ca.vertcat(expected, 1) if has_axial else expected,
         tables=numbers.groups,
-        start_covariance=_start_covariance(states, wind_start_covariance, deviations),
+        start_covariance=_start_covariance(states, start, deviations),
         discontinuities=vehicle.discontinuities,
         start=vehicle.start,
         end=vehicle.end,
@@ -132,18 +135,32 @@ def _position(vehicle: Vehicle, motion: Motion) -> tuple[Block, ...]:
     return (Block.of("lateral_position", motion.lateral_position, motion.lateral_velocity, "m", scale),)
 
 
-def _white_noises(of_wind: int, deviations: Iterable[str]) -> tuple[Noise, ...]:
-    return (*(Noise(f"{WIND}_{i + 1}", WIND) for i in range(of_wind)), *(Noise(name, name) for name in deviations))
+def _winds(vehicle: Vehicle, numbers: Numbers) -> dict[str, WindBlock]:
+    """Return what is random in the wind that is met, by source."""
+    tables, rate = numbers.tables, numbers.tables["altitude_rate"]
+    found = {WIND: wind_block(vehicle.wind.shaping_filter, tables, rate, numbers.sigma_scale)}
+    if vehicle.turbulence and numbers.turbulence:
+        driver = found[WIND].white[0]
+        found[TURBULENCE] = turbulence_block(vehicle.turbulence, numbers.turbulence, tables, rate, driver)
+    return found
+
+
+def _white_noises(winds: Mapping[str, WindBlock], deviations: Iterable[str]) -> tuple[Noise, ...]:
+    of_winds = (Noise(f"{source}_{i + 1}", source) for source, part in winds.items() for i in range(part.white.numel()))
+    return (*of_winds, *(Noise(name, name) for name in deviations))
 
 
 def _start_covariance(
-    states: Sequence[State], wind: np.ndarray, deviations: dict[str, NoiseProcess]
-) -> dict[str, np.ndarray]:
-    """Return the covariance at the start by source: of the wind's filter as given, of a deviation one."""
-    found = {source: np.zeros((len(states), len(states))) for source in (WIND, *deviations)}
-    rows = block_of(states, WIND)
-    found[WIND][rows, rows] = wind
+    states: Sequence[State], winds: Mapping[str, ca.SX], deviations: dict[str, NoiseProcess]
+) -> dict[str, ca.SX | np.ndarray]:
+    """Return the covariance at the start by source: of the winds' states as given, of a deviation one."""
+    found: dict[str, ca.SX | np.ndarray] = {}
+    for source, given in winds.items():
+        whole, rows = ca.SX(len(states), len(states)), block_of(states, source)
+        whole[rows, rows] = given
+        found[source] = np.array(ca.evalf(whole)) if whole.is_constant() else whole
     for name, process in deviations.items():
+        found[name] = np.zeros((len(states), len(states)))
         for state in deviation_block(name, process).states:
             row = states.index(state)
             found[name][row, row] = 1.0

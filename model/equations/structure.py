@@ -16,12 +16,14 @@ def structure_in_words(vehicle: Vehicle, states: int, groups: Sequence[TableGrou
     file, biases = vehicle.file, ", ".join(vehicle_biases(vehicle.file))
     orders = (f"{n} {len(e.denominator) - 1}" for n, e in vehicle.transfer_functions.items())
     relief = ", ".join(f"{n} of order {len(e.filter.denominator) - 1}" for n, e in file.control.load_relief.items())
+    turbulence = vehicle.turbulence
     return {
         **({"load relief": relief} if relief else {}),
         "bending modes": str(len(vehicle.bending)),
         "slosh tanks": ", ".join(t.name for t in vehicle.slosh) or "none",
         "transfer function orders": ", ".join(orders),
         "wind filter": f"order {vehicle.wind.shaping_filter.order}, {vehicle.wind.shaping_filter.noise_count} noises",
+        **({"turbulence": f"{turbulence.form}, order {turbulence.order}"} if turbulence else {}),
         "noise sources": ", ".join(f"{n} ({'white' if e.white else 'coloured'})" for n, e in vehicle.noise.items()),
         "loads": ", ".join(load_outputs(file)),
         "extra outputs": ", ".join(file.options.extra_outputs) or "none",

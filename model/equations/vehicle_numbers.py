@@ -14,6 +14,7 @@ from ..vehicle.vehicle import Vehicle
 from .control import transfer_function_symbols
 from .load_relief import Sensor, sensor_symbols
 from .noise import NoiseProcess, bias_process, noise_process
+from .turbulence import TurbulenceNumbers
 from .vehicle_tables import vehicle_tables
 
 
@@ -45,6 +46,7 @@ class Numbers:
         Of the vehicle (m), by the bending moment whose station they are at.
     undisturbed : SX
         The known input of value one that carries what no wind and no deviation makes: the axial force's mean.
+    turbulence : TurbulenceNumbers or None
     """
 
     time: ca.SX
@@ -64,6 +66,7 @@ class Numbers:
     sensors: dict[str, Sensor]
     radii: dict[str, ca.SX]
     undisturbed: ca.SX
+    turbulence: TurbulenceNumbers | None
 
     @property
     def deviations(self) -> dict[str, NoiseProcess]:
@@ -106,6 +109,7 @@ class Numbers:
                 if load.radius_m is not None
             },
             undisturbed=ca.SX.sym("undisturbed"),
+            turbulence=TurbulenceNumbers.of(vehicle.turbulence, parameters) if vehicle.turbulence else None,
         )
 
 

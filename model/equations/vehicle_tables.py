@@ -25,9 +25,11 @@ def vehicle_tables(vehicle: Vehicle) -> tuple[TableGroup, ...]:
     polynomials.append(("altitude_rate", "m/s", vehicle.tables["altitude"].polynomial.derivative()))
     flight = TableGroup.from_polynomials("flight", "time", polynomials, vehicle.start, vehicle.end)
     wind, mean = vehicle.wind.shaping_filter, vehicle.wind.mean
-    over_altitude = [(t.name, t.unit, t.polynomial) for t in (mean, *wind.tables())]
-    bottom = min(float(wind.altitude[0]), float(mean.argument[0]))
-    top = max(float(wind.altitude[-1]), float(mean.argument[-1]))
+    own = [mean, *wind.tables()]
+    if vehicle.turbulence is not None:
+        own.append(vehicle.turbulence.intensity)
+    over_altitude = [(t.name, t.unit, t.polynomial) for t in own]
+    bottom, top = min(float(t.argument[0]) for t in own), max(float(t.argument[-1]) for t in own)
     wind_group = TableGroup.from_polynomials("wind", "altitude", over_altitude, bottom, top)
     knots = mean_knots(vehicle.start, vehicle.end, vehicle.discontinuities)
     zero = np.zeros((knots.size - 1, 4, len(MEAN_TABLES)))

@@ -24,13 +24,12 @@ class WindBlock:
     wind: ca.SX
 
 
-def wind_block(shaping_filter: ShapingFilter, tables: TableSymbols, scale: ca.SX) -> WindBlock:
-    """Return the filter in flight time; ``scale`` multiplies its output."""
+def wind_block(shaping_filter: ShapingFilter, tables: TableSymbols, rate: ca.SX, scale: ca.SX) -> WindBlock:
+    """Return the filter in flight time at a rate of climb (m/s); ``scale`` multiplies its output."""
     n, m = shaping_filter.order, shaping_filter.noise_count
     matrices = {"F": ca.SX(n, n), "G": ca.SX(n, m), "H": ca.SX(1, n)}
     for label, i, j in shaping_filter.entries:
         matrices[label][i, j] = tables[entry_name(label, i, j)]
     z, white = ca.SX.sym("wind", n), ca.SX.sym("white_wind", m)
-    rate = tables["altitude_rate"]
     derivative = rate * (matrices["F"] @ z) + ca.sqrt(rate) * (matrices["G"] @ white)
     return WindBlock(z, derivative, white, scale * (matrices["H"] @ z))

@@ -8,6 +8,7 @@ import re
 UNDISTURBED = "undisturbed_flight"  # the known input of a vehicle, of value one, that carries its axial forces' means
 COMBINED = "combined"  # in every result, beside the sources: their sum
 WIND = "wind"  # the source of a vehicle's wind filter
+TURBULENCE = "turbulence"  # the source of its turbulence
 LONGEST = 200  # characters of a name or unit
 
 # A vehicle's noises, tanks and loads: name or pattern, and who has it. Every name that assemble(), the tables and the
@@ -15,6 +16,7 @@ LONGEST = 200  # characters of a name or unit
 NOISE_NAMES = {
     WIND: "the source of the wind filter",
     r"wind_\d+": "a white noise of the wind filter",
+    rf"{TURBULENCE}(_\d+)?": "the source of turbulence and its white noise",
     COMBINED: "the sum over all sources in every result",
     "tables": "the prefix of factors on tables in parameter studies",
 }

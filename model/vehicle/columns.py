@@ -60,6 +60,7 @@ WIND = (
     Column("mean", "m/s", "", "mean wind in the yaw plane"),
     Column("standard_deviation", "m/s", "+", "of the wind about its mean"),
 )
+TURBULENCE = (Column("sigma", "m/s", "0", "standard deviation of turbulence"),)
 
 # of a load, by which the rigid body answers slosh
 SECOND_MOMENT = Column(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -88,12 +89,36 @@ def check_wind(wind: WindModel, flight: LoadedFlight) -> None:
     ExtrapolationWarning
         The loaded flight leaves the altitudes of the mean or the filter, beyond what the wind's record declares.
     """
+    altitudes = {
+        "the mean wind": wind.mean.argument,
+        f"wind filter '{wind.shaping_filter.name}'": wind.shaping_filter.altitude,
+    }
+    _warn_of_ends(altitudes, flight, wind.record)
+    _check_deviation(wind, flight)
+
+
+def check_intensity(intensity: Table, flight: LoadedFlight) -> None:
+    """Hold a table of turbulence's intensity against the flight through it.
+
+    Raises
+    ------
+    DataError
+        It lies beside the loaded flight.
+
+    Warns
+    -----
+    ExtrapolationWarning
+        The loaded flight leaves its altitudes.
+    """
+    _warn_of_ends({"the turbulence's intensity": intensity.argument}, flight, None)
+
+
+def _warn_of_ends(
+    altitudes: Mapping[str, NDArray[np.float64]], flight: LoadedFlight, record: WindRecord | None
+) -> None:
     told: dict[str, list[str]] = {}
-    for name, altitude in (
-        ("the mean wind", wind.mean.argument),
-        (f"wind filter '{wind.shaping_filter.name}'", wind.shaping_filter.altitude),
-    ):
-        beyond = _beyond(name, float(altitude[0]), float(altitude[-1]), flight, wind.record)
+    for name, altitude in altitudes.items():
+        beyond = _beyond(name, float(altitude[0]), float(altitude[-1]), flight, record)
         if beyond:
             told.setdefault(beyond, []).append(name)
     for beyond, names in told.items():
@@ -102,9 +127,8 @@ def check_wind(wind: WindModel, flight: LoadedFlight) -> None:
                 f"{' and '.join(names)}: the flight is {beyond}; values are held at the last ones there, so that the "
                 "wind goes on with the statistics of that end"
             ),
-            stacklevel=3,
+            stacklevel=4,
         )
-    _check_deviation(wind, flight)
 
 
 def _beyond(name: str, low: float, high: float, flight: LoadedFlight, record: WindRecord | None) -> str:

@@ -21,6 +21,7 @@ from ..wind.range_reference import check_against_edition
 from ..wind.record import WindOrigin, WindRecord
 from ..wind.shaping_filter import TwoPartKernel
 from ..wind.statistics import WindModel, check_plausible, closed_form_filter, report_standard_deviation
+from ..wind.turbulence import INTENSITY, Turbulence, turbulence_intensity
 from .columns import (
     AERODYNAMICS,
     ALTITUDE,
@@ -34,20 +35,21 @@ from .columns import (
     SLOSH,
     TIME,
     TRAJECTORY,
+    TURBULENCE,
     WIND,
     Column,
     bending_columns,
     local_columns,
     mode_columns,
 )
-from .coverage import check_schedule, check_wind, loaded_flight
+from .coverage import check_intensity, check_schedule, check_wind, loaded_flight
 from .loads import AXIAL_FORCE, lateral_loads, load_name
 from .names import name_faults
 from .noise_loads import check_noises, form_is_open, form_of_tables, needed_columns, needed_for
 from .plausibility import check_plausibility
 from .shipped import VEHICLE_FILE
 from .vehicle import TableSource, Vehicle
-from .vehicle_file import TableEntry, VehicleFile, WindEntry, WindRecordEntry, read_vehicle_file
+from .vehicle_file import TableEntry, TurbulenceEntry, VehicleFile, WindEntry, WindRecordEntry, read_vehicle_file
 
 REGULAR = 1.5  # times the usual step: in a table whose other steps are shorter, rows were lost at a longer one
 FORMER_Q_ALPHA = "dynamic_pressure_times_angle_of_attack"
@@ -123,9 +125,10 @@ def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehi
             reader.add(f"loads.{output}", entry.axial, AXIAL, f"loads.{output}.")
     if file.options.local_angle_of_attack:
         _add_local(reader, file)
-    wind = None
+    wind = turbulence = None
     with reader.collector.part():
         wind = _load_wind(folder, file.wind, reader)
+        turbulence = _load_turbulence(file.wind.turbulence, wind, reader)
     reader.collector.raise_all()
     for name, noise in file.noise.items():
         for table in noise.tables:
@@ -161,9 +164,10 @@ def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehi
         end=last.last,
         discontinuities=switch_times((t for t in reader.discontinuities if start < t < last.last), start),
         sources=tuple(reader.sources),
+        turbulence=turbulence,
     )
     check_plausibility(vehicle)
-    _check_coverage(reader, wind, start, last.last)
+    _check_coverage(reader, wind, turbulence, start, last.last)
     return vehicle
 
 
@@ -232,6 +236,7 @@ class _Reader:
 
     def __init__(self, folder: Path, toml: Path, file: VehicleFile):
         self.folder, self.toml, self.events, self.start = folder, toml, file.events, file.start_time_s
+        self.file = file
         self.tables: dict[str, Table] = {}
         self.sources: list[TableSource] = []
         self.discontinuities: set[float] = set()
@@ -386,6 +391,32 @@ def _load_wind(folder: Path, entry: WindEntry, reader: _Reader) -> WindModel:
         raise DataError(error.why, file=file) from None
 
 
+def _load_turbulence(entry: TurbulenceEntry | None, wind: WindModel, reader: _Reader) -> Turbulence | None:
+    """Return a vehicle's turbulence, None where it is off."""
+    if entry is None or entry.severity == "off":
+        return None
+    if entry.intensity is None:
+        assert entry.severity is not None  # checked by TurbulenceEntry
+        intensity, file = turbulence_intensity(entry.severity), reader.toml
+    else:
+        csv = reader.read("wind.turbulence", entry.intensity, TURBULENCE, ALTITUDE)
+        columns, file = (csv.columns[name] for name in ("altitude", "sigma")), csv.file
+        intensity = Table(INTENSITY, "m/s", *columns, entry.intensity.interpolation)
+    high_pass, length = None if entry.high_pass_m == "none" else entry.high_pass_m, entry.length_m
+    low, high = (float(x) for x in wind.mean.argument[[0, -1]])
+    if high_pass is not None and high_pass > high - low:
+        raise DataError(
+            f"is {high_pass:g} m, more than the {high - low:g} m that the wind's statistics cover: no wave of theirs "
+            "is longer; give about twice the distance of their levels",
+            file=reader.toml,
+            column="wind.turbulence.high_pass_m",
+        )
+    try:
+        return Turbulence(entry.form, intensity, length, high_pass, entry.correlation)
+    except DataError as error:
+        raise DataError(error.why, file=file, column="wind.turbulence") from None
+
+
 def _wind_record(entry: WindRecordEntry | None, toml: Path) -> WindRecord | None:
     if entry is None:
         warnings.warn(
@@ -410,7 +441,7 @@ def _wind_record(entry: WindRecordEntry | None, toml: Path) -> WindRecord | None
         raise DataError(error.why, file=toml, column="wind.record") from None
 
 
-def _check_coverage(reader: _Reader, wind: WindModel, start: float, end: float) -> None:
+def _check_coverage(reader: _Reader, wind: WindModel, turbulence: Turbulence | None, start: float, end: float) -> None:
     """Hold schedules of the control system and the wind against the part of the flight that they must cover."""
     flight = loaded_flight(reader.tables, start, end)
     for name, (table, file) in reader.schedules.items():
@@ -419,3 +450,9 @@ def _check_coverage(reader: _Reader, wind: WindModel, start: float, end: float) 
         check_wind(wind, flight)
     except DataError as error:
         raise DataError(error.why, file=reader.toml, column="wind") from None
+    entry = reader.file.wind.turbulence
+    if turbulence is not None and entry is not None and entry.intensity is not None:
+        try:
+            check_intensity(turbulence.intensity, flight)
+        except DataError as error:
+            raise DataError(error.why, file=file_inside(reader.folder, entry.intensity.file)) from None

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from ..tables import Table
 from ..wind.statistics import WindModel
+from ..wind.turbulence import Turbulence
 from .vehicle_file import (
     BendingEntry,
     NoiseEntry,
@@ -47,6 +48,8 @@ class Vehicle:
         Times at which a table jumps.
     sources : tuple of TableSource
         Provenance by file.
+    turbulence : Turbulence, optional
+        Beside the wind of the statistics, whichever that is.
     """
 
     name: str
@@ -59,6 +62,7 @@ class Vehicle:
     end: float
     discontinuities: tuple[float, ...]
     sources: tuple[TableSource, ...]
+    turbulence: Turbulence | None = None
 
     def __repr__(self) -> str:
         parts = f"{len(self.bending)} bending modes, {len(self.slosh)} slosh masses, {len(self.noise)} noises"

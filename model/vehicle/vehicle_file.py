@@ -10,6 +10,7 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from ..files.folder_files import FileName
 from ..files.toml_file import Name, NotNegative, Positive, Section, read_toml
+from ..wind.turbulence import HIGH_PASS, LENGTH
 
 ExtraOutput = Literal["lateral_drift", "drift_rate", "dynamic_pressure_times_angle_of_attack", "load_components"]
 STRUCTURE = "structure"  # marks keys that change the equations, not numbers in them
@@ -214,6 +215,30 @@ class WindRecordEntry(Section):
     independent_samples: Annotated[float, Field(gt=1)] | None = None
 
 
+class TurbulenceEntry(Section):
+    """Turbulence beside the wind of the statistics, as intense as ``severity`` of MIL-F-8785C or a table of one's own.
+
+    ``severity = "off"`` leaves it out and keeps the rest for another day.
+    """
+
+    severity: Annotated[Literal["off", "light", "moderate", "severe"] | None, STRUCTURE] = None
+    intensity: TableEntry | None = None
+    form: Annotated[Literal["dryden", "von-karman-2", "von-karman-3"], STRUCTURE] = "dryden"
+    length_m: Positive = LENGTH
+    high_pass_m: Annotated[Positive | Literal["none"], STRUCTURE] = HIGH_PASS
+    correlation: Annotated[Annotated[float, Field(gt=-1, lt=1)] | None, STRUCTURE] = None
+
+    @model_validator(mode="after")
+    def _one_intensity(self):
+        if self.severity is None and self.intensity is None:
+            raise ValueError(
+                'needs severity = "light", "moderate" or "severe", or a table as [wind.turbulence.intensity]'
+            )
+        if self.severity not in (None, "off") and self.intensity is not None:
+            raise ValueError("has a severity and a table of its own intensity; keep one")
+        return self
+
+
 class WindEntry(Section):
     """``synthesis`` chooses between ``filter``, a file of 'ascentwind wind fit', and [wind.correlation]."""
 
@@ -223,6 +248,7 @@ class WindEntry(Section):
     filter: FileName | None = None
     correlation: CorrelationEntry | None = None
     record: WindRecordEntry | None = None
+    turbulence: TurbulenceEntry | None = None
 
     @model_validator(mode="after")
     def _one_filter(self):

@@ -12,6 +12,7 @@ one-sided. The soundings' variance already holds part of it: see ``high_pass``.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,8 +26,11 @@ from .shaping_filter import ShapingFilter
 VON_KARMAN = 1.339
 LENGTH = 533.4  # m, of MIL-F-8785C above 2000 ft (1750 ft), Dryden form
 SEVERITY = {"light": "1e-2", "moderate": "1e-3", "severe": "1e-5"}  # probability of exceedance
+INTENSITY = "turbulence.sigma"  # the table of sigma over altitude, m/s
 FORMS = ("dryden", "von-karman-2", "von-karman-3")
 SPACING = 250.0  # m, of the filter's samples
+HIGH_PASS = 2000.0  # m: levels of soundings are 1 km apart, and longer waves are in their statistics for certain
+LARGEST_INTENSITY = 26.0  # m/s, more than any turbulence has
 
 # Numerator and denominator in L s, one at s = 0. Von Karman: least squares of the logarithm of the transverse spectrum,
 # L Omega from 0.05 to 60, within 9 % (third order) and a factor 1.6 (second); variance 0.98 and 1.03 of sigma^2
@@ -37,6 +41,60 @@ RATIONAL = {
 }
 
 
+@dataclass(frozen=True, eq=False)
+class Turbulence:
+    """Turbulence along a flight, beside the wind of its statistics.
+
+    Parameters
+    ----------
+    form : {'dryden', 'von-karman-2', 'von-karman-3'}
+    intensity : Table
+        sigma over altitude, m/s; held beyond its ends.
+    length : float
+        L, m.
+    high_pass : float or None
+        Wavelength, m, of the first-order high pass that takes out what the wind's statistics hold; None without one.
+    correlation : float or None
+        Of its noise with the first noise of the wind's filter; None for independent ones.
+
+    Raises
+    ------
+    UnknownNameError, DataError
+    """
+
+    form: str
+    intensity: Table
+    length: float = LENGTH
+    high_pass: float | None = HIGH_PASS
+    correlation: float | None = None
+
+    def __post_init__(self):
+        if self.form not in FORMS:
+            raise UnknownNameError("form of turbulence", self.form, FORMS)
+        sigma = self.intensity.values
+        if not ((sigma >= 0) & (sigma <= LARGEST_INTENSITY)).all():
+            k = int(np.argmax(~((sigma >= 0) & (sigma <= LARGEST_INTENSITY))))
+            raise DataError(
+                f"a turbulence of {sigma[k]:g} m/s at {self.intensity.argument[k]:g} m is none; give sigma in m/s, "
+                f"from 0 to {LARGEST_INTENSITY:g}"
+            )
+        if not self.length > 0 or (self.high_pass is not None and not self.high_pass > 0):
+            raise DataError("turbulence needs a positive length scale and a high pass at a positive wavelength")
+        if self.correlation is not None and not abs(self.correlation) < 1:
+            raise DataError(f"a correlation of {self.correlation:g} of two noises is not between -1 and 1")
+
+    @property
+    def order(self) -> int:
+        """Number of states."""
+        return self.row.size
+
+    @property
+    def row(self) -> NDArray[np.float64]:
+        """The wind in terms of the states for sigma = 1, (order,)."""
+        C = realisation(self.form)[2]
+        return C if self.high_pass is None else np.append(C, -1.0)
+
+
 def turbulence_intensity(severity: str = "moderate") -> Table:
     """Return sigma over altitude, m/s, MIL-F-8785C figure 7; 'light', 'moderate' or 'severe'."""
     if severity not in SEVERITY:
@@ -44,7 +102,7 @@ def turbulence_intensity(severity: str = "moderate") -> Table:
     rows = read_rows(WIND_DATA / "turbulence_mil_f_8785c.csv")
     altitude = np.array([float(r["altitude [m]"]) for r in rows])
     sigma = np.array([float(r[f"sigma_{SEVERITY[severity]} [m/s]"]) for r in rows])
-    return Table("turbulence.sigma", "m/s", altitude, sigma, "linear")
+    return Table(INTENSITY, "m/s", altitude, sigma, "linear")
 
 
 def transverse_spectrum(form: str, wave_number: ArrayLike, sigma: float, length: float) -> NDArray[np.float64]:
@@ -95,7 +153,7 @@ def turbulence_filter(
     scale = np.asarray(length(h) if callable(length) else np.full(h.size, float(length)), float)
     if not (scale > 0).all() or (sigma < 0).any():
         raise DataError("turbulence needs positive length scales and intensities that are not negative")
-    A, B, C = _realisation(form)
+    A, B, C = realisation(form)
     n = A.shape[0] + (high_pass is not None)
     F, G, H = np.zeros((h.size, n, n)), np.zeros((h.size, n, 1)), np.zeros((h.size, n))
     for k, L in enumerate(scale):
@@ -117,8 +175,8 @@ def turbulence_filter(
     )
 
 
-def _realisation(form: str) -> tuple[NDArray, NDArray, NDArray]:
-    """Return A, B, C of the form for L = 1 and sigma = 1, in states of unit variance."""
+def realisation(form: str) -> tuple[NDArray, NDArray, NDArray]:
+    """Return A, B, C of a form for L = 1 and sigma = 1, in states of unit variance: z' = A z + B n, W = C z."""
     numerator, denominator = (np.array(c) for c in RATIONAL[form])
     numerator, denominator = numerator / denominator[0], denominator / denominator[0]
     n = denominator.size - 1

@@ -38,7 +38,7 @@ from .mean import LinearMean, NonlinearMean
 from .summary import summary
 from .wind_start import covariance_at
 
-POSITIVE = ("correlation_time", "reference_area", "standard_deviation", "radius")
+POSITIVE = ("correlation_time", "reference_area", "standard_deviation", "radius", "length", "high_pass")
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -11,7 +11,7 @@ from rich.table import Table
 
 from ..present.terminal import console
 from .job import Job, load_study, steps
-from .terminal import Changes, VehicleArgument, results_folder, whole
+from .terminal import Changes, Turbulence, VehicleArgument, results_folder, whole
 
 WIDE = 150  # columns: tables that a narrow terminal wraps but a file keeps whole
 
@@ -25,6 +25,7 @@ def verify(
     seed: Annotated[int, typer.Option(parser=whole, help="Of the ensemble's noise.")] = 504,
     out: Annotated[Path | None, typer.Option(help="Folder for a figure of sample paths; none without it.")] = None,
     changes: Changes = None,
+    turbulence: Turbulence = None,
 ) -> None:
     """The same statistics by independent engines, with a verdict; exit code 1 when they disagree."""
     from ..case.times import parse_times, spread_over
@@ -34,7 +35,7 @@ def verify(
     from ..statistics.response_figures import sample_path_figure
 
     ensemble = Ensemble(runs=runs, seed=seed, paths=min(30, runs) if out else 0)
-    study = load_study(vehicle, changes, [] if times else ["default_times"])
+    study = load_study(vehicle, changes, [] if times else ["default_times"], turbulence=turbulence)
     flown = study.vehicle_for("default times")
     end_times = parse_times(times) if times else spread_over(parse_times(flown.file.default_times), 4)
     study.checked_times(end_times)

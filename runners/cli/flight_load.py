@@ -12,7 +12,7 @@ from ...model.errors import AscentwindError, TimeRangeError, UnusedOptionError
 from ...model.files.numbers import parse_number
 from ..present.terminal import console, errors
 from .job import Job, load_study, steps
-from .terminal import Changes, VehicleArgument, number, results_folder, whole
+from .terminal import Changes, Turbulence, VehicleArgument, number, results_folder, whole
 
 SHOWN_LIMITS = 8
 SHOWN_PARAMETERS = 8
@@ -47,6 +47,7 @@ def flight_load(
     seed: Annotated[int, typer.Option(parser=whole, help="Of the draws.")] = 0,
     out: Annotated[Path | None, typer.Option(help="Folder for results; VEHICLE-flight-load without it.")] = None,
     changes: Changes = None,
+    turbulence: Turbulence = None,
 ) -> None:
     """The load of the whole flight: levels that its largest values pass, exceedance, limits and margins."""
     from ..flight_load.capability_figure import capability_figure
@@ -65,7 +66,9 @@ def flight_load(
     flown = None if window is None else parse_window(window)
     limits = None if limit is None else Limits.read(limit)
     checked_draws(draws, seed)
-    study = load_study(vehicle, changes, ["title", "default_times"] if window is None else ["title"])
+    study = load_study(
+        vehicle, changes, ["title", "default_times"] if window is None else ["title"], turbulence=turbulence
+    )
     names = study.checked_responses(response or None)
     flown = checked_window(study, flown)
     if limits is not None:

@@ -11,7 +11,7 @@ from rich.table import Table
 from ...model.errors import UnknownNameError
 from ..present.terminal import console
 from .job import Job, load_study, steps
-from .terminal import Changes, VehicleArgument, number, results_folder
+from .terminal import Changes, Turbulence, VehicleArgument, number, results_folder
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -39,6 +39,7 @@ def gust(
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder for results; VEHICLE-gust without it.")] = None,
     changes: Changes = None,
+    turbulence: Turbulence = None,
 ) -> None:
     """Discrete gusts of all lengths at all altitudes: the worst of them, and combined loads."""
     from ..case.times import parse_times
@@ -56,7 +57,9 @@ def gust(
             raise UnknownNameError("shape of a gust", name, list(KNOWN))
     ends = None if times is None else parse_times(times)
     gusts = [KNOWN[name](LENGTHS[1], amplitude) for name in dict.fromkeys(shape or SHAPES)]
-    study = load_study(vehicle, changes, ["title", "default_times"] if times is None else ["title"])
+    study = load_study(
+        vehicle, changes, ["title", "default_times"] if times is None else ["title"], turbulence=turbulence
+    )
     known = study.vehicle_for("a gust")
     names = list(dict.fromkeys(response)) if response else None
     sweeps = [study.gust_sweep(each, ends, responses=names, lengths=length or None) for each in gusts]

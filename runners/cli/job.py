@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rich.progress import Progress
 
-from ...model.errors import UnusedOptionError
+from ...model.errors import UnknownNameError, UnusedOptionError
 from ..present.terminal import console, progress_bar
 from .terminal import parse_changes
 
@@ -18,9 +18,15 @@ if TYPE_CHECKING:
     from ..study import Study
 
 SHOWN = ("default_times", "title", "weighting_times_s")  # keys of vehicle.toml that no equation holds
+KEY = "wind.turbulence.severity"
 
 
-def load_study(vehicle: str | Path, changes: Sequence[str] | None = None, shows: Sequence[str] = ()) -> Study:
+def load_study(
+    vehicle: str | Path,
+    changes: Sequence[str] | None = None,
+    shows: Sequence[str] = (),
+    turbulence: str | None = None,
+) -> Study:
     """Load a vehicle with the changes typed after ``--set``.
 
     Parameters
@@ -30,12 +36,16 @@ def load_study(vehicle: str | Path, changes: Sequence[str] | None = None, shows:
         Each 'KEY=VALUE'.
     shows : sequence of str
         Which of ``SHOWN`` the command reads: another one would change nothing.
+    turbulence : str, optional
+        What was typed after ``--turbulence``.
 
     Raises
     ------
     DataError, UnknownNameError, UnusedOptionError
     """
     wanted = checked_changes(changes, shows)
+    if turbulence is not None:
+        wanted |= _with_turbulence(turbulence, wanted)
     with console.status("loading and preparing code"):
         from ..study import Study
 
@@ -54,6 +64,16 @@ def checked_changes(changes: Sequence[str] | None, shows: Sequence[str] = ()) ->
         if key in wanted and key not in shows:
             raise UnusedOptionError(f"--set {key} is not used here and would change nothing; leave it out")
     return wanted
+
+
+def _with_turbulence(typed: str, changes: Mapping[str, Any]) -> dict[str, Any]:
+    from ...model.wind.turbulence import SEVERITY
+
+    if typed not in (known := ("off", *SEVERITY)):
+        raise UnknownNameError("severity of turbulence", typed, known)
+    if {"wind.turbulence", KEY} & changes.keys():
+        raise UnusedOptionError(f"--turbulence and --set {KEY} name two severities; leave one of them out")
+    return {KEY: typed}
 
 
 class Steps:

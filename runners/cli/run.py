@@ -12,7 +12,7 @@ from ...model.errors import AscentwindError, UnusedOptionError
 from ..present.terminal import console, errors
 from .flight_load import print_levels
 from .job import SHOWN, Job, load_study, steps
-from .terminal import Changes, VehicleArgument, number, parse_changes, results_folder
+from .terminal import Changes, Turbulence, VehicleArgument, number, parse_changes, results_folder
 
 if TYPE_CHECKING:
     from ..flight_load.load import FlightLoad
@@ -40,6 +40,7 @@ def run(
         ),
     ] = None,
     changes: Changes = None,
+    turbulence: Turbulence = None,
     along_vehicle: Annotated[
         str | None,
         typer.Option(help="Loads along the vehicle at this time (s, or 'peak'), and its envelope."),
@@ -66,7 +67,7 @@ def run(
     engine_from(engine, **settings)  # refused before anything is computed
     if times and "default_times" in parse_changes(changes or []):
         raise UnusedOptionError("--set default_times is not used with --times; leave one of them out")
-    study = load_study(vehicle, changes, SHOWN)
+    study = load_study(vehicle, changes, SHOWN, turbulence=turbulence)
     flown = study.vehicle_for("a run")
     compare_stated_twice(flown)
     chosen = engine_from(engine, compiled=study.executable.shared_library is not None, **settings)

@@ -10,7 +10,7 @@ import typer
 from ..present.terminal import console
 from ..statistics.larger_side import LARGER_SIDE
 from .job import Job, load_study
-from .terminal import Changes, VehicleArgument, refuse_unused, results_folder
+from .terminal import Changes, Turbulence, VehicleArgument, refuse_unused, results_folder
 
 
 def sensitivity(
@@ -24,6 +24,7 @@ def sensitivity(
     ] = LARGER_SIDE,
     out: Annotated[Path | None, typer.Option(help="Folder for results; VEHICLE-sensitivity without it.")] = None,
     changes: Changes = None,
+    turbulence: Turbulence = None,
 ) -> None:
     """Which parameter, second of a table and kilometre of wind drives a response: exact derivatives, ranked."""
     from ..case.times import parse_time_or_peak
@@ -33,7 +34,9 @@ def sensitivity(
     at = parse_time_or_peak(time)
     if quantity == "mean":
         refuse_unused(context, ["source"], "with --quantity mean, to which no noise contributes")
-    study = load_study(vehicle, changes, ["title"] if at != "peak" else ["title", "default_times"])
+    study = load_study(
+        vehicle, changes, ["title"] if at != "peak" else ["title", "default_times"], turbulence=turbulence
+    )
     asked = Request.of(study, response or study.system.output_names[0], source, quantity)
     if at != "peak":
         study.checked_times([at])

@@ -58,6 +58,11 @@ Changes = Annotated[
     typer.Option("--set", help="KEY=VALUE in the place of vehicle.toml's, e.g. options.full_coupling=true."),
 ]
 
+Turbulence = Annotated[
+    str | None,
+    typer.Option(help="off, light, moderate or severe (MIL-F-8785C), in the place of vehicle.toml's."),
+]
+
 
 def number(typed: str | float) -> float:
     """Return a number typed as an option, in the notation of files: neither '1_0' nor 'nan'."""

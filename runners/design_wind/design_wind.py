@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from ...codegen.system.evaluation import MatrixEvaluator
 from ...model.equations.noise import DEVIATION
-from ...model.errors import ParameterValueError, TimeRangeError
-from ...model.system.names import WIND
+from ...model.errors import DataError, ParameterValueError, TimeRangeError
+from ...model.system.names import TURBULENCE, WIND
+from ...model.wind.turbulence import INTENSITY
 from ..case.case import Case
 from ..case.chain import chain_at
 from ..case.climb import Climb
@@ -224,7 +225,7 @@ class DesignWind:
         """E[deviation | load] of the vehicle's sources over (source, t), to t2; None for the load of the wind alone.
 
         In the unit of each source's standard deviation; a white source has that of white noise. That of a wind bias is
-        a factor on the mean wind, which the profile leaves out.
+        a factor on the mean wind, which the profile leaves out; turbulence is a wind in m/s.
         """
         if not self.combined:
             return None
@@ -240,7 +241,10 @@ class DesignWind:
         names, values = [s for s in system.sources if s != WIND], []
         for name in names:
             states = [k for k, s in enumerate(system.states) if s.name == f"{DEVIATION}_{name}"]
-            if states:
+            if name == TURBULENCE:
+                P = chain.covariance([system.sources.index(name)])
+                values.append(np.einsum("ki,kin,kn->k", self._turbulence(grid), P[:, system.block(name)], back))
+            elif states:
                 (sigma,) = (p.value for n, p in case.parameters.items() if n in _sigmas(name))
                 P = chain.covariance([system.sources.index(name)])
                 values.append(sigma * np.einsum("kn,kn->k", P[:, states[0]], back))
@@ -253,6 +257,14 @@ class DesignWind:
             {"source": names, "t": ("t", grid, {"units": "s", "long_name": "flight time"})},
             provenance(case),
         )
+
+    def _turbulence(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return turbulence (m/s) in terms of its states at times (k,), (k, order)."""
+        vehicle = self.case.vehicle_for("turbulence")
+        assert vehicle.turbulence is not None  # it is a source
+        sigma = np.array([self.case.tables(float(t))[INTENSITY] for t in times])
+        scale = self.case.parameters["turbulence.sigma_scale"].value
+        return scale * np.outer(sigma, vehicle.turbulence.row)
 
     def __repr__(self) -> str:
         kind = "of all sources" if self.combined else "of the wind alone"
@@ -285,6 +297,12 @@ def design_wind(
     if isinstance(sigmas, bool) or not isinstance(sigmas, int | float) or not math.isfinite(sigmas):
         raise ParameterValueError(f"a load of {sigmas!r} sigmas is none; give a number, negative for the other side")
     climb = Climb.of(case)
+    turbulence = case.vehicle_for("a design wind").turbulence
+    if turbulence is not None and turbulence.correlation is not None:
+        raise DataError(
+            "turbulence is correlated with the wind, so that one filter does not tell which wind is behind a load; "
+            "leave wind.turbulence.correlation out"
+        )
     (name,) = case.checked_responses([response])
     (end,) = case.checked_times([seconds(time)])
     executable, system = case.with_means, case.system

@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 from scipy.special import ndtri
 from scipy.stats import norm
 
-from ...model.system.names import COMBINED, WIND
+from ...model.system.names import COMBINED, TURBULENCE, WIND
 from ...model.vehicle.biases import WIND_BIAS
 from ..case.provenance import provenance
 from ..present.netcdf import RULE
@@ -27,6 +27,7 @@ from .weights import wind_weights
 CHANCE = 0.00135  # 1 - Phi(3)
 DESIGN_WIND = 0.99  # one-sided; the wind that a gust is added to
 REDUCED = 0.85  # on wind and gust where both are added (TM X-64757 as it is remembered, not checked)
+OF_WIND = (WIND, TURBULENCE, WIND_BIAS)
 PHASES = 201  # of the vehicle inside a gust
 MEANINGS = {
     "mean": "mean response in the mean wind",
@@ -65,8 +66,8 @@ def combined_loads(sweep: GustSweep) -> xr.Dataset:
         at = {"time": each.time, "response": each.response}
         mean = float(found.mean.sel(source=COMBINED, **at))
         variance = {str(s): float(found.variance.sel(source=s, **at)) for s in found["source"].values if s != COMBINED}
-        wind = np.sqrt(sum(v for name, v in variance.items() if name in (WIND, WIND_BIAS)))
-        vehicle = np.sqrt(sum(v for name, v in variance.items() if name not in (WIND, WIND_BIAS)))
+        wind = np.sqrt(sum(v for name, v in variance.items() if name in OF_WIND))
+        vehicle = np.sqrt(sum(v for name, v in variance.items() if name not in OF_WIND))
         whole, size = float(np.hypot(wind, vehicle)), abs(each.value)
         sheet["mean"].append(mean)
         sheet["random_wind"].append(3 * wind)

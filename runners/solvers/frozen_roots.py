@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 from ...codegen.system.executable import ExecutableSystem
 from ...model.equations.noise import DEVIATION
 from ...model.system.linear_system import LinearSystem
-from ...model.system.names import WIND
+from ...model.system.names import TURBULENCE, WIND
 from ...model.tables import table_values
 
 RIGID_BODY = "rigid_body"
 MODES, SLOSH = ("bending", "bending_rate"), ("slosh", "slosh_rate")  # blocks of states
-UNCONTROLLED = "uncontrolled"  # wind filter and deviations: no vehicle parameter moves their roots
+UNCONTROLLED = "uncontrolled"  # wind, turbulence and deviations: no vehicle parameter moves their roots
 
 
 def state_families(system: LinearSystem) -> list[str]:
@@ -34,7 +34,7 @@ def state_families(system: LinearSystem) -> list[str]:
         elif state.block in SLOSH:
             families.append("slosh")
         else:
-            families.append(UNCONTROLLED if state.block in (WIND, DEVIATION) else RIGID_BODY)
+            families.append(UNCONTROLLED if state.block in (WIND, TURBULENCE, DEVIATION) else RIGID_BODY)
     return families
 
 

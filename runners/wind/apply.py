@@ -30,6 +30,7 @@ from .synthesis.synthesise import synthesise
 
 DECIMALS = 3  # of a table of soundings, m/s, and of their number
 AZIMUTH_TOLERANCE = 1e-6  # deg
+KEPT = "turbulence"  # of [wind]: it goes with any wind
 
 _HEADER = re.compile(r"""^\s*\[\[?\s*(?P<name>[A-Za-z0-9_."'-]+)\s*\]\]?\s*(#.*)?$""")
 
@@ -207,14 +208,15 @@ def _wind_section(record: WindRecord, table: str, filter_file: str, command: str
 
 
 def _with_wind(text: str, section: str, file: Path) -> str:
-    """Return the text of a vehicle.toml with another [wind] and its parts; all else stays as it is."""
+    """Return the text of a vehicle.toml with another [wind] and its parts; turbulence and all else stay as they are."""
     kept: list[str] = []
     dropped: list[str] = []
     place, inside = None, False
     for line in text.splitlines(keepends=True):
         header = _HEADER.match(line)
         if header:
-            inside = header["name"].split(".")[0].strip("\"'") == "wind"
+            keys = [key.strip("\"'") for key in header["name"].split(".")]
+            inside = keys[0] == "wind" and keys[1:2] != [KEPT]
             if inside:
                 place = len(kept) if place is None else place
                 dropped = []
@@ -226,7 +228,11 @@ def _with_wind(text: str, section: str, file: Path) -> str:
     head, tail = "".join(kept[:place]).rstrip("\n"), "".join(kept[place:])
     changed = f"{head}\n\n{section}\n{tail}" if tail else f"{head}\n\n{section}"
     before = _parsed(text)
-    if before is None or _parsed(changed) != before | tomllib.loads(section):
+    expected = tomllib.loads(section)
+    wind = (before or {}).get("wind")
+    if isinstance(wind, dict) and KEPT in wind:
+        expected["wind"][KEPT] = wind[KEPT]
+    if before is None or _parsed(changed) != before | expected:
         raise DataError(
             "the wind does not stand in [wind] and [wind.NAME] sections of their own in a valid TOML file; write it "
             "so, then apply again",

@@ -341,6 +341,15 @@ def test_comments_and_sections_around_the_wind_stay(falcon, no_fit):
     assert changed.partition("# about options")[2] == text.partition("# about options")[2]
 
 
+def test_turbulence_goes_with_any_wind(falcon, no_fit):
+    toml = falcon / "vehicle.toml"
+    asked = '[wind.turbulence]\nseverity = "light"\nlength_m = 400.0\n'
+    toml.write_text(toml.read_text().replace("[options]", f"{asked}\n[options]"))
+    applied(falcon)
+    assert asked in toml.read_text()
+    assert quiet(falcon).turbulence.length == 400.0
+
+
 def test_a_wind_is_written_whole_or_not_at_all(falcon, no_fit, monkeypatch):
     before = {p.name: p.read_bytes() for p in falcon.iterdir() if p.is_file()}
     write = wind_apply.write_whole

@@ -254,3 +254,18 @@ def test_bad_draws(behind):
     for count, seed in ((0, 0), (1.5, 0), (10, -1), (True, 0)):
         with pytest.raises(aw.errors.ParameterValueError):
             behind["engine_angle"].draws(count, seed)
+
+
+@pytest.mark.slow
+def test_turbulence_is_a_deviation_beside_the_wind(cache):
+    """Behind alpha at t2 there is turbulence too, of less than 3 of its own sigma."""
+    study = aw.Study.load("as504", changes={"wind.turbulence.severity": "severe"})
+    found = study.design_wind("angle_of_attack", TIME, combined=True)
+    statistics = study.response_statistics([TIME], responses=["angle_of_attack"]).variance.squeeze()
+    assert found.std**2 == pytest.approx(float(statistics.sel(source="combined")), rel=1e-6)
+    turbulence = found.deviations["deviation"].sel(source="turbulence")
+    assert 1.0 < float(turbulence.isel(t=-1)) < 3 * 3.0
+    with pytest.raises(aw.errors.DataError, match="correlation out"):
+        aw.Study.load(
+            "as504", changes={"wind.turbulence.severity": "severe", "wind.turbulence.correlation": 0.2}, compile=False
+        ).design_wind("angle_of_attack", TIME)
