@@ -57,6 +57,7 @@ UNUSED = [
             ["wind", "compare", "as504"],
         )
     ),
+    (["run", "as504", "--turbulence", "light", "--set", 'wind.turbulence.severity="severe"'], "two severities"),
     (["sensitivity", "as504", "--set", "weighting_times_s=[70]"], "--set weighting_times_s is not used here"),
     (["regenerate", "--set", "options.slosh_reaction=true"], "--set needs a vehicle"),
     (["run", "as504", "--set", 'wind.correlation.source="x"'], 'used with wind.synthesis = "closed_form"'),
@@ -70,20 +71,21 @@ UNUSED = [
 
 # Options of every command: an option that is not here must be looked at, whether some other one makes it idle
 KNOWN = {
-    "run": {"times", "out", "engine", "method", "tolerance", "changes", "along_vehicle", "probability"},
+    "run": {"times", "out", "engine", "method", "tolerance", "turbulence", "changes", "along_vehicle", "probability"},
     "flight-load": {
-        "window", "response", "probability", "limit", "sides", "sensitivity", "draws", "seed", "out", "changes",
+        "window", "response", "probability", "limit", "sides", "sensitivity", "draws", "seed", "out", "turbulence",
+        "changes",
     },
-    "gust": {"shape", "response", "amplitude", "length", "times", "out", "changes"},
+    "gust": {"shape", "response", "amplitude", "length", "times", "out", "turbulence", "changes"},
     "vehicles": set(),
     "new-vehicle": {"source"},
     "inspect": {"time", "json", "changes"},
     "regenerate": {"out", "changes"},
     "doctor": set(),
     "cache": {"clean"},
-    "verify": {"times", "runs", "seed", "out", "changes"},
+    "verify": {"times", "runs", "seed", "out", "turbulence", "changes"},
     "tolerance": {"times", "out", "changes"},
-    "sensitivity": {"response", "time", "source", "quantity", "out", "changes"},
+    "sensitivity": {"response", "time", "source", "quantity", "out", "turbulence", "changes"},
     "equations": {"of", "by", "page", "changes"},
     "study": {"out", "scheduler"},
     "mean": {"out", "changes"},
