@@ -12,6 +12,8 @@ import xarray as xr
 from ..codegen.sweep.compiled import sweep_of
 from ..model.errors import IntegrationError, ParameterValueError
 from ..model.system.names import COMBINED
+from ..model.wind.soundings.collection import Soundings
+from ..model.wind.soundings.sounding import Sounding
 from .case.case import Case
 from .case.times import end_times
 from .design_wind.design_wind import DesignWind, design_wind
@@ -22,6 +24,7 @@ from .flight_load.passage import Passage
 from .gusts.response import gust_response
 from .gusts.search import GustSweep, gust_sweep
 from .gusts.shapes import Gust, OneMinusCosine
+from .measured_winds.fly import FlownWinds, fly
 from .sensitivity.check import check_sensitivity
 from .sensitivity.many import sensitivities
 from .sensitivity.one import sensitivity
@@ -479,6 +482,45 @@ class Study(Case):
         GustError, TimeRangeError, UnknownNameError, NoVehicleError, DataError, IntegrationError
         """
         return gust_sweep(self, gust or OneMinusCosine(), times, responses, lengths)
+
+    def fly(
+        self,
+        profiles: str | Path | Soundings | Sounding,
+        times: Iterable[float] | None = None,
+        *,
+        responses: Iterable[str] | None = None,
+        component: str | None = None,
+        sign: int = 1,
+    ) -> FlownWinds:
+        """Return what measured winds make of responses, beside what the vehicle's Gaussian wind predicts.
+
+        Histories are products of the profiles with the weighting functions, integrated over the levels; nothing is
+        integrated again for further profiles at the same levels.
+
+        Parameters
+        ----------
+        profiles : path, Soundings or Sounding
+            A file whose soundings share levels, or what :func:`ascentwind.read_soundings` returns. Straight between
+            levels; where a profile holds nothing, the filter's mean given the profile.
+        times : iterable of float, optional
+            End times, s; the vehicle's default ones without it.
+        responses : iterable of str, optional
+            All without it.
+        component : {'zonal', 'meridional'}, optional
+            What blows across the flight; the wind's record says it without it.
+        sign : {1, -1}
+            With ``component``: 1 when its positive direction is the vehicle's +Y.
+
+        Returns
+        -------
+        FlownWinds
+            ``histories``, ``percentiles()``, ``maxima``, ``worst(response)``, ``normality``.
+
+        Raises
+        ------
+        NoVehicleError, DataError, SoundingError, UnknownNameError, TimeRangeError, DirectNoiseError
+        """
+        return fly(self, profiles, times, responses, component, sign)
 
     def sensitivity(
         self,

@@ -21,6 +21,7 @@ FLOORS = (
     ("runners.sensitivity", "runners.station_loads"),
     ("runners.flight_load", "runners.gusts"),
     ("runners.design_wind",),
+    ("runners.measured_winds",),
     ("runners.study",),
     ("runners.design", "runners.parameter_study", "runners.views"),
     ("runners.reproduction",),

@@ -13,6 +13,7 @@ FILES = {  # command: its file in this folder, where a function or a group of th
     "run": "run",
     "flight-load": "flight_load",
     "gust": "gust",
+    "fly": "fly",
     "verify": "checks",
     "tolerance": "checks",
     "sensitivity": "sensitivity",

@@ -148,12 +148,17 @@ def stats(
     edition: Edition = "1983",
     top: Top = 16000.0,
     soundings: Soundings = None,
+    normality: Annotated[
+        Path | None, typer.Option(help="Folder for a figure of quantiles; with --soundings, tests are printed too.")
+    ] = None,
 ) -> None:
-    """Mean, standard deviation with its 90 % interval, and correlation with the level below."""
+    """Mean, standard deviation with its 90 % interval, and correlation with the level below; how normal they are."""
     import numpy as np
 
     from ..wind.fitting.intervals import covariance_interval
 
+    if soundings is None:
+        refuse_unused(context, ["normality"], "without --soundings: the shipped tables hold no profiles")
     s = _statistics(context, period, component, edition, top, soundings)
     low, high = covariance_interval(s.covariance, s.independent_samples)
     table = Table(title=f"{s.name}, {s.independent_samples:.0f} independent samples", caption=s.source)
@@ -164,6 +169,34 @@ def stats(
         interval = f"{np.sqrt(low[i, i]):.2f} - {np.sqrt(high[i, i]):.2f}"
         table.add_row(f"{h:g}", f"{s.mean[i]:.2f}", f"{s.standard_deviation[i]:.2f}", interval, below)
     console.print(table)
+    if soundings is not None and normality is not None:
+        _print_normality(soundings, component, normality)
+
+
+def _print_normality(soundings: Path, component: str, folder: Path) -> None:
+    """Print tests of normality by level and write the figure of quantiles."""
+    from ...model.wind.soundings.collection import independent_samples
+    from ...model.wind.soundings.normality import normality
+    from ...model.wind.soundings.read import read_soundings
+    from ..present.style import write_figure
+    from ..wind.normality_figure import normality_figure
+
+    read = read_soundings(soundings)
+    values = read.component(component)
+    found = normality(values, independent_samples(values, read.day))
+    job = Job(folder)
+    caption = "chances of values at least as far off if winds were normal; 4.55 % lie beyond 2 sigma then"
+    table = Table(title=f"{component}, as of {found.independent:.0f} independent profiles", caption=caption)
+    for column in ("altitude, m", "skewness", "kurtosis", "chance of both", "beyond 2 σ", "chance", "beyond 3 σ"):
+        table.add_column(column, justify="right")
+    for i, h in enumerate(read.altitude):
+        table.add_row(
+            f"{h:g}", f"{found.skewness[i]:+.2f}", f"{found.kurtosis[i]:+.2f}", f"{found.probability[i]:.2g}",
+            f"{100 * found.beyond[i]:.1f} %", f"{found.tail_probability[i]:.2g}", f"{100 * found.far_beyond[i]:.2f} %",
+        )  # fmt: skip
+    console.print(table)
+    job.written += write_figure(normality_figure(read, f"{read.source}, {read.period}"), folder, "normality")
+    job.end()
 
 
 @wind.command()

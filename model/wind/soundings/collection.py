@@ -136,6 +136,13 @@ class Soundings:
                 f"{self.source}: {int(pairs[i, j])} profiles hold {where}; statistics need {FEWEST} at least: give "
                 "more soundings, or ask for levels below"
             )
+        still = np.nanstd(both, axis=0) == 0
+        if still.any():
+            i = int(np.argmax(still))
+            raise SoundingError(
+                f"{self.source}: the {'zonal' if i < k else 'meridional'} wind is the same in all profiles at "
+                f"{self.altitude[i % k]:g} m, which no statistics are made of; see what the file holds there"
+            )
         if seen.all():
             found = np.asarray(np.corrcoef(both, rowvar=False))
         else:

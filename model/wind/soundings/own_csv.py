@@ -32,8 +32,8 @@ DATES = "2008-03-17, or 2008-03-17T12:00 in UTC"
 def read_own_csv(file: Path, wanted: Wanted, quality: Quality) -> Iterator[Sounding]:
     """Return the profiles of a CSV file.
 
-    Columns ``profile``, ``altitude [m]`` (or km, ft), and ``u [m/s]``, ``v [m/s]`` or ``speed [m/s]``,
-    ``direction [deg]`` (or kt, ft/s, km/h); ``date`` and ``station`` may be left out.
+    Columns ``altitude [m]`` (or km, ft), and ``u [m/s]``, ``v [m/s]`` or ``speed [m/s]``, ``direction [deg]`` (or kt,
+    ft/s, km/h); ``profile`` where there are several, and ``date`` and ``station``, may be left out.
 
     Raises
     ------
@@ -50,7 +50,7 @@ def read_own_csv(file: Path, wanted: Wanted, quality: Quality) -> Iterator[Sound
     for line, cells in rows[1:]:
         if len(cells) != len(rows[0][1]):
             raise SoundingError(f"has {len(cells)} cells where the header has {len(rows[0][1])}", file=file, row=line)
-        name = cells[index["profile"]].strip()
+        name = cells[index["profile"]].strip() if "profile" in index else file.stem
         if profile is None or name != profile.name:
             if profile is not None:
                 yield from profile.sounding(wanted, quality)
@@ -155,7 +155,7 @@ def _header(cells: list[str], file: Path, row: int) -> tuple[dict[str, int], dic
         index[name] = k
         factor[name] = UNITS[name][unit] if name in UNITS and unit is not None else 1.0
     components = {"u", "v"} & set(index) or not {"speed", "direction"} & set(index)
-    needed = ("profile", "altitude", *(("u", "v") if components else ("speed", "direction")))
+    needed = ("altitude", *(("u", "v") if components else ("speed", "direction")))
     if components and {"speed", "direction"} & set(index):
         raise SoundingError("has both components and speed or direction; keep one of the two", file=file, row=row)
     for name in needed:

@@ -267,6 +267,14 @@ def test_pairs_that_do_not_fit_together_are_repaired_and_said(tmp_path):
     assert "nearest correlation matrix" in both.zonal.source
 
 
+def test_a_level_that_never_changes_has_no_statistics(tmp_path):
+    u, v = winds(12)
+    file = tmp_path / "s.csv"
+    file.write_text(files.own_text(LEVELS, u, 0 * v))
+    with pytest.raises(SoundingError, match="the meridional wind is the same in all profiles at 0 m"):
+        read_soundings(file).statistics("still")
+
+
 def test_soundings_twice_a_day_are_more_alike_than_days():
     random, x = np.random.default_rng(0), [np.zeros(1)]
     for _ in range(4000):

@@ -34,6 +34,7 @@ TAKE_CHANGES = [
     ["mean", "as504"],
     ["flight-load", "as504"],
     ["gust", "as504"],
+    ["fly", "as504", "wind.csv"],
     ["inspect", "as504", "--time", "70"],
     ["equations"],
     ["regenerate", "as504"],
@@ -51,6 +52,7 @@ def changes_asked_for(monkeypatch, tmp_path):
     """Return with which changes a command loads its vehicle."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "design.toml").write_text(DESIGN)
+    (tmp_path / "wind.csv").write_text("altitude [m],u [m/s],v [m/s]\n0,3,0\n9000,30,0\n")
 
     def load(vehicle, *, compile=True, changes=None):
         raise Asked(vehicle, changes)
@@ -62,7 +64,9 @@ def changes_asked_for(monkeypatch, tmp_path):
         assert isinstance(found.exception, Asked), found.output
         vehicle, changes = found.exception.args
         assert vehicle == "as504"
-        assert list(tmp_path.iterdir()) == [tmp_path / "design.toml"], "a folder was made before the vehicle is known"
+        assert {p.name for p in tmp_path.iterdir()} == {"design.toml", "wind.csv"}, (
+            "a folder was made before the vehicle is known"
+        )
         return changes
 
     return run

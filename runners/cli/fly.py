@@ -1,0 +1,110 @@
+"""The command ``fly``: a vehicle through measured winds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.table import Table
+
+from ..present.terminal import console
+from .job import Job, load_study
+from .soundings import parse_levels
+from .terminal import Changes, VehicleArgument, refuse_unused, results_folder, whole
+
+if TYPE_CHECKING:
+    from ..measured_winds.fly import FlownWinds
+
+SHOWN = 5  # of the worst profiles
+
+
+def fly(
+    context: typer.Context,
+    vehicle: VehicleArgument,
+    soundings: Annotated[Path, typer.Argument(help="IGRA, Wyoming, FSL, netCDF, GRIB or CSV.")],
+    times: Annotated[
+        str | None, typer.Option(help="START:STOP:STEP or T1,T2,... in s; the vehicle's default times without it.")
+    ] = None,
+    response: Annotated[list[str] | None, typer.Option(help="Response, several times; all without it.")] = None,
+    levels: Annotated[
+        str | None, typer.Option(help="START:STOP:STEP or H1,H2,... in m, for soundings that share none.")
+    ] = None,
+    component: Annotated[
+        str | None, typer.Option(help="zonal or meridional, across the flight; as the wind's record says without it.")
+    ] = None,
+    sign: Annotated[int, typer.Option(parser=whole, help="With --component: 1 or -1 along the vehicle's +Y.")] = 1,
+    out: Annotated[Path | None, typer.Option(help="Folder for results; VEHICLE-flown without it.")] = None,
+    changes: Changes = None,
+) -> None:
+    """Fly measured winds: histories, percentiles and flight maxima beside what the vehicle's Gaussian wind predicts."""
+    from ...model.wind.soundings.read import read_soundings
+    from ..case.times import parse_times
+    from ..measured_winds.files import write_flown
+    from ..measured_winds.flown_figure import flown_figure
+    from ..present.style import words, write_figure
+
+    if component is None:
+        refuse_unused(context, ["sign"], "without --component")
+    ends = None if times is None else parse_times(times)
+    read = read_soundings(soundings, None if levels is None else parse_levels(levels))
+    study = load_study(vehicle, changes, ["title", "default_times"] if times is None else ["title"])
+    names = study.checked_responses(response or None)
+    job = Job(out or results_folder(vehicle, "flown"))
+    with console.status("flying"):
+        flown = study.fly(read, ends, responses=names, component=component, sign=sign)
+        _ = flown.predicted_maxima
+    job.replace_earlier("fly", study.system.name)
+    job.written += write_flown(flown, job.folder)
+    title = study.vehicle_for("a flown wind").title
+    for name in names:
+        job.written += write_figure(flown_figure(flown, name, title), job.folder, f"flown_{name}")
+    for line in read.quality.lines():
+        console.print(line, style="dim", soft_wrap=True, highlight=False, markup=False)
+    print_flown(flown)
+    for name in names[:1]:
+        table = Table("profile", "date", title=f"Largest {words(name)}")
+        for column in ("value", "time, s"):
+            table.add_column(column, justify="right")
+        unit = study.system.outputs[study.system.output_index(name)].unit
+        for profile, date, value, time in flown.worst(name, SHOWN):
+            table.add_row(profile, date, f"{value:.4g} {unit}", f"{time:g}")
+        console.print(table)
+    job.end()
+
+
+def print_flown(flown: FlownWinds) -> None:
+    """Print flight maxima of the profiles beside those of a Gaussian wind, and what non-normality does to 3 sigma."""
+    import numpy as np
+
+    from ..present.style import display, words
+
+    n = len(flown.values)
+    drawn = "" if len(flown.completed) == n else ", what was not measured drawn"
+    table = Table("response", title=f"Largest size over the flight: {n} profiles{drawn} / Gaussian wind")
+    for column in ("median", "95 %", "99 %", "largest"):
+        table.add_column(column, justify="right", no_wrap=True)
+    for r, name in enumerate(flown.responses):
+        unit = flown.case.system.outputs[flown.case.system.output_index(name)].unit
+        measured, predicted = flown.maxima[:, r], flown.predicted_maxima[:, r]
+        factor, shown = display(unit, measured)
+        cells = [
+            " / ".join(f"{factor * np.quantile(x, p):.4g}" for x in (measured, predicted)) for p in (0.5, 0.95, 0.99)
+        ]
+        table.add_row(words(name), *cells, f"{factor * np.abs(flown.values[:, :, r]).max():.4g} {shown}")
+    console.print(table)
+    missed = flown.missed_share.max(axis=0)
+    console.print(
+        f"Winds straight between their levels miss up to {100 * missed.max():.1f} % of the wind's variance "
+        f"({words(flown.responses[int(missed.argmax())])}).", soft_wrap=True, highlight=False,
+    )  # fmt: skip
+    for name in flown.responses:
+        skewed = flown.skewed_levels(name)
+        if skewed is None:
+            continue
+        side, at = np.unravel_index(int(np.abs(skewed).argmax()), skewed.shape)
+        console.print(
+            f"{words(name)}: skewness and kurtosis of the profiles move the level of 3 sigma by at most "
+            f"{skewed[side, at]:+.2f} sigma ({('upper', 'lower')[int(side)]} side at {flown.weights.times[at]:g} s).",
+            soft_wrap=True, highlight=False,
+        )  # fmt: skip

@@ -1,0 +1,137 @@
+"""Measured profiles as the wind across a vehicle's flight, completed where nothing was measured."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...model.errors import DataError, UnknownNameError
+from ...model.wind.record import COMPONENTS
+from ...model.wind.soundings.collection import Soundings
+from ...model.wind.soundings.quality import Quality
+from ...model.wind.soundings.read import LARGEST_GAP, at_levels, read_soundings
+from ...model.wind.soundings.sounding import Sounding
+from ..case.case import Case
+from ..case.climb import Climb
+from .conditioning import Measured
+from .random_wind import random_wind
+
+FILL = 250.0  # m, between levels where nothing was measured
+
+
+@dataclass(frozen=True, eq=False)
+class CompleteProfiles:
+    """Winds at levels from below the flight to above it.
+
+    Attributes
+    ----------
+    levels : (k,) array
+        m.
+    wind : (n, k) array
+        Along the vehicle's +Y, m/s: as measured, and elsewhere what the filter lets expect given that.
+    observed : (n, k) array of bool
+    pattern : (n,) array of int
+        Number of the profile's set of observed levels.
+    residual : tuple of (k, k) arrays
+        Covariance of the wind given what was observed, by pattern; None where all levels were.
+    names : tuple of str
+    time : (n,) array of datetime64
+    source : str
+    """
+
+    levels: NDArray[np.float64]
+    wind: NDArray[np.float64]
+    observed: NDArray[np.bool_]
+    pattern: NDArray[np.intp]
+    residual: tuple[NDArray[np.float64] | None, ...]
+    names: tuple[str, ...]
+    time: NDArray[np.datetime64]
+    source: str
+
+
+def across(case: Case, component: str | None, sign: int) -> tuple[str, int]:
+    """Return which component of a wind blows across a vehicle's flight, and with which sign it is along +Y.
+
+    Raises
+    ------
+    DataError, UnknownNameError
+    """
+    vehicle = case.vehicle_for("a measured wind")
+    record = vehicle.wind.record
+    if component is None:
+        if record is None:
+            raise DataError(
+                "does not say which component of the wind blows across the flight; add [wind.record], or give "
+                "component= ('zonal' or 'meridional')", file=vehicle.folder / "vehicle.toml", column="wind.record",
+            )  # fmt: skip
+        return record.origin.component, record.sign
+    if component not in COMPONENTS:
+        raise UnknownNameError("wind component", component, COMPONENTS)
+    if sign not in (1, -1):
+        raise DataError(f"the sign of a wind is {sign!r}; give 1 or -1")
+    return component, sign
+
+
+def soundings_of(profiles: str | Path | Soundings | Sounding) -> Soundings:
+    """Return soundings from what a person gives: a file at common levels, soundings, or one of them.
+
+    Raises
+    ------
+    SoundingError, DataError
+    """
+    if isinstance(profiles, Soundings):
+        return profiles
+    if isinstance(profiles, Sounding):
+        return at_levels([profiles], Quality(1), profiles.altitude, LARGEST_GAP, "use", "refuse")
+    if isinstance(profiles, str | Path):
+        return read_soundings(profiles)
+    raise DataError(f"{profiles!r:.60} are no soundings; give a file, or what read_soundings returns")
+
+
+def complete_profiles(
+    case: Case, soundings: Soundings, last: float, component: str | None = None, sign: int = 1
+) -> CompleteProfiles:
+    """Return profiles up to the altitude ``last`` (m) of the flight.
+
+    Between levels the wind is straight. Where a profile holds nothing, below its first level, above its last one and in
+    gaps, it is the filter's conditional mean given the profile, on levels at most 250 m apart, and its covariance is
+    kept. Winds are of the season of the vehicle's mean: a deviation from it decays towards it.
+
+    Raises
+    ------
+    NoVehicleError, DataError, UnknownNameError
+    """
+    which, direction = across(case, component, sign)
+    measured = direction * soundings.component(which)
+    first = float(Climb.of(case).altitudes[0])
+    own = soundings.altitude
+    below = np.arange(own[0] - FILL, first - FILL, -FILL)[::-1] if own[0] > first else np.zeros(0)
+    above = np.arange(own[-1] + FILL, last + FILL, FILL) if own[-1] < last else np.zeros(0)
+    levels = np.concatenate([np.maximum(below, min(first, own[0] - 1.0)), own, above])
+    levels = np.unique(levels)
+    at = np.searchsorted(levels, own)
+    wind = np.full((len(measured), levels.size), np.nan)
+    wind[:, at] = measured
+    observed = np.isfinite(wind)
+    patterns, pattern = np.unique(observed, axis=0, return_inverse=True)
+    random = random_wind(case, levels)
+    R, residual = random.covariance, []
+    for number, seen in enumerate(patterns):
+        if seen.all():
+            residual.append(None)
+            continue
+        which_rows = np.flatnonzero(pattern == number)
+        hidden = ~seen
+        K = Measured(R[np.ix_(seen, seen)])
+        gain = K.whitened(R[np.ix_(seen, hidden)])
+        deviation = K.whitened((wind[np.ix_(which_rows, seen)] - random.mean[seen]).T)
+        wind[np.ix_(which_rows, hidden)] = random.mean[hidden] + deviation.T @ gain
+        left = np.zeros_like(R)
+        left[np.ix_(hidden, hidden)] = R[np.ix_(hidden, hidden)] - gain.T @ gain
+        residual.append(left)
+    return CompleteProfiles(
+        levels, wind, observed, pattern.ravel(), tuple(residual), soundings.names, soundings.time, soundings.source
+    )
