@@ -79,7 +79,6 @@ KNOWN = {
         "changes",
     },
     "gust": {"shape", "response", "amplitude", "length", "times", "out", "turbulence", "changes"},
-    "gust": {"shape", "response", "amplitude", "length", "times", "out", "changes"},
     "fly": {"times", "response", "levels", "component", "sign", "out", "changes"},
     "vehicles": set(),
     "new-vehicle": {"source"},
