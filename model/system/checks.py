@@ -118,7 +118,7 @@ def _rounded(value: Real) -> float:
     try:
         return float(value)
     except OverflowError:
-        return math.copysign(math.inf, int(value))
+        return math.inf if value > 0 else -math.inf  # pyright: ignore[reportOperatorIssue]  # Real lacks the order
 
 
 def check_keys(kind: str, given: Mapping[str, object], known: Iterable[str]) -> None:

@@ -52,6 +52,9 @@ def main() -> None:
         if handler.heard:
             _leave()
         raise
+    finally:
+        if listens:
+            signal.signal(signal.SIGINT, signal.SIG_IGN)  # all is done: Python, as it ends, would die of it
 
 
 def _leave() -> None:

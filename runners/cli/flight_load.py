@@ -37,7 +37,7 @@ def flight_load(
     ] = None,
     limit: Annotated[
         Path | None,
-        typer.Option(help="CSV: 'time [s]', 'station [m]' or both, then limits such as 'bending_moment [N m]'."),
+        typer.Option(help="CSV: time in s, station in m or both, then limits such as 'bending_moment [N m]'."),
     ] = None,
     sides: Annotated[str, typer.Option(help="both, upper or lower.")] = "both",
     sensitivity: Annotated[
@@ -258,16 +258,17 @@ def print_passage(passage: Passage) -> None:
     """Print the chance to pass any of several limits, and where it comes from."""
     p, chance = passage.probability, passage.by_load.values
     table = Table("limit of", title="Limits passed most often")
-    for column in ("chance", "least margin", "at"):
+    for column in ("chance", "least margin", "side", "at"):
         table.add_column(column, justify="right", no_wrap=True)
     from ..present.style import display
 
-    margin, times = passage.margin.values, passage.margin["time"].values
+    margin, times, mean = passage.margin.values, passage.margin["time"].values, passage.process.drawn.mean
     for r in sorted(range(chance.size), key=lambda r: -chance[r])[:SHOWN_LIMITS]:
         load, at = passage.loads[r], int(margin[:, r].argmin())
         factor, unit = display(load.unit, passage.limit[:, r])
         left = f"{factor * margin[at, r]:.3g} {unit}"
-        table.add_row(str(load), f"{chance[r]:.3g}", left, f"{times[at]:.4g} s")
+        side = passage.sides if passage.sides != "both" else "lower" if mean[at, r] < 0 else "upper"
+        table.add_row(str(load), f"{chance[r]:.3g}", left, side, f"{times[at]:.4g} s")
     console.print(table)
     console.print(
         f"Any of {len(passage.loads)} limits is passed by {p.value:.3g} of flights (95 %: {p.interval[0]:.2g} to "

@@ -75,17 +75,23 @@ def with_flight_levels(statistics: ResponseStatistics, loads: Sequence[FlightLoa
     -------
     ResponseStatistics
         Over (response) besides: ``flight_level``, ``flight_level_lower`` and ``flight_level_upper``, the ends of the
-        95 % interval of the sampling; NaN for a response without a load.
+        95 % interval of the sampling, NaN for a response without a load; ``flight_level_upper_share``, the share of the
+        flights that pass it on the upper side.
     """
-    found = {load.response: (float(load.level[0]), *load.levels[0].interval) for load in loads}
+    found = {
+        load.response: (float(load.level[0]), *load.levels[0].interval, float(load.side_shares.sel(side="upper")[0]))
+        for load in loads
+    }
     names = [str(name) for name in statistics.dataset["response"].values]
-    values = np.array([found.get(name, (np.nan,) * 3) for name in names])
+    values = np.array([found.get(name, (np.nan,) * 4) for name in names])
     what = f"that the largest value of a flight passes with probability {loads[0].probabilities[0]:g}"
     labels = {"flight_level": f"level {what}", "flight_level_lower": "lower end", "flight_level_upper": "upper end"}
     variables = {
         name: ("response", values[:, k], {RULE: "response", "long_name": label})
         for k, (name, label) in enumerate(labels.items())
     }
+    share = {"units": "1", "long_name": "share of the flights that pass the level which do so on the upper side"}
+    variables["flight_level_upper_share"] = ("response", values[:, 3], share)
     window = list(loads[0].window)
     return ResponseStatistics(statistics.dataset.assign(variables).assign_attrs(flight_level_window_s=window))
 

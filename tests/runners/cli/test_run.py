@@ -79,7 +79,7 @@ def test_sensitivity_ranks_and_writes(ascentwind, tmp_path, as504):
     rows = list(csv.reader((tmp_path / "found" / "sensitivity.csv").open()))
     stored = {row[1]: float(row[5]) for row in rows if row[0] == "parameter"}
     assert stored == pytest.approx(e.to_dict(), rel=1e-8)
-    assert {row[0] for row in rows[1:]} == {"parameter", "table", "row", "kilometre"}
+    assert {row[0] for row in rows[1:]} == {"parameter", "grouped factor", "table", "row", "kilometre"}
     with xr.open_dataset(tmp_path / "found" / "sensitivity.nc", engine="scipy") as dataset:
         mass = expected.isel(knot=expected["knot_table"].values == "mass")
         np.testing.assert_allclose(dataset["mass_knot_derivative"], mass["knot_derivative"], rtol=1e-9, atol=1e-12)

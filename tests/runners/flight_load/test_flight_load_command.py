@@ -77,7 +77,7 @@ def test_limits_along_the_vehicle(flight_load, tmp_path):
     once = {name: (folder / name).read_bytes() for name in names}
     flight_load(*arguments)  # the same seed, the same bytes
     assert {name: (folder / name).read_bytes() for name in names} == once
-    flight_load("--out", "found", "--seed", "2", "--sides", "upper", "--set", "wind.sigma_scale=0.9")
+    flight_load("--out", "found", "--seed", "2", "--sides", "upper", "--set", "options.full_coupling=true")
     assert not (folder / "limits.nc").exists()  # of the run before
     assert (folder / "flight_load.nc").read_bytes() != once["flight_load.nc"]
 

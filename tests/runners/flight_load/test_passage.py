@@ -135,7 +135,7 @@ def test_deviations_have_those_covariances(small):
 @pytest.mark.slow
 def test_constants_have_their_closed_form(pair):
     """A constant of a flight passes with 2 (1 - Phi(u / sigma)); two of them with 1 - (1 - P1) (1 - P2)."""
-    first, second = 2 * norm.sf(2.0 / 2.0), 2 * norm.sf(0.8)
+    first, second = (2 * float(norm.sf(sigmas)) for sigmas in (1.0, 0.8))
     found = passage(pair, {"still": 2.0, "idle": 0.8}, draws=1000)
     same(found.probability, None, 1 - (1 - first) * (1 - second))
     np.testing.assert_allclose(found.by_load, [first, second], rtol=0.08)
