@@ -94,6 +94,7 @@ def test_axial_force_is_inertia_and_drag_forward_of_the_station(as504, line):
     assert (found.std.sel(source=["wind", "center_of_pressure"]).values == 0).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", [Sweep(relative_tolerance=1e-9), CovarianceEquation(1e-9)])
 def test_derived_loads_follow_from_moment_and_axial_force(as504, engine):
     """N +- 2 M / R and q alpha, mean and covariance, by either engine; both engines agree in the variances."""
@@ -214,6 +215,7 @@ def test_radius_is_a_parameter(as504):
     assert float(change.sel(response="shear_force")) == pytest.approx(0, abs=1e-6 * abs(M))
 
 
+@pytest.mark.slow
 def test_sensitivities_of_the_new_loads(as504):
     """The axial force's deviation is proportional to the noise's, its mean to no parameter; shear by differences."""
     found = as504.sensitivity("axial_force", TIME)

@@ -133,6 +133,7 @@ def test_correlated_with_the_wind_when_asked(gusty):
     assert share == pytest.approx(1 - r**2, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_a_table_of_ones_own(edit):
     """Constant sigma of 2 m/s is twice that of 1 m/s; what the table does not cover is told."""
     section = (

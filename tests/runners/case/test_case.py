@@ -38,6 +38,7 @@ def test_checked_names_and_times_are_returned(as504):
     assert as504.checked_responses("bending_moment") == ["bending_moment"]
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:wind filter")
 def test_a_batch_with_the_nonlinear_mean_is_one_study_after_another():
     study = aw.Study.load("falcon1", changes={"options.mean_response": "nonlinear"})

@@ -152,6 +152,7 @@ def test_worst_gust_is_a_maximum(as504, small_sweep):
         assert abs(float(near["response_to_gust"][0, 0])) <= abs(worst.value)
 
 
+@pytest.mark.slow
 def test_along_vehicle_at_the_output_station(as504, small_sweep):
     """Without the answer to slosh the load along the vehicle is the output's, whose rows stand in other equations."""
     worst = small_sweep.worst("bending_moment")

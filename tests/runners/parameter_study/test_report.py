@@ -183,6 +183,7 @@ def test_band_shows_percentiles_over_time(dispersed):
     assert named == ["1 to 99 %", "5 to 95 %", "median", "nominal", "5 to 95 %, first order"]
 
 
+@pytest.mark.slow
 def test_unstable_members_leave_tables_and_figures_readable(study, tmp_path):
     """At tau = -0.3 s the lag grows by 2e4 in 3 s, at -0.1 s by 1e13."""
     given = dispersion(24, {"name": "tau", "distribution": "uniform", "low": -0.3, "high": 0.3}, seed=6)

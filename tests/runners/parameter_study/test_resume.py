@@ -97,6 +97,7 @@ def test_only_what_is_missing_is_computed(study, tmp_path, monkeypatch):
     assert (tmp_path / "study.nc").read_bytes() == expected
 
 
+@pytest.mark.slow
 def test_a_flipped_bit_is_not_taken_for_a_result(study, tmp_path, caplog):
     run_parameter_study(PLAN, tmp_path, study=study)
     expected = (tmp_path / "study.nc").read_bytes()
@@ -183,6 +184,7 @@ def test_a_limit_on_the_size_of_a_file(study, tmp_path):
     assert (tmp_path / "study.nc").exists()
 
 
+@pytest.mark.slow
 def test_stopped_by_the_keyboard_it_goes_on_later(study, tmp_path):
     def stop(done: int, total: int) -> None:
         if done >= 50:

@@ -96,6 +96,7 @@ def test_studies_of_other_structure_are_not_compared(as504, as504_closed_form):
         directional_derivative(found, as504, as504_closed_form)
 
 
+@pytest.mark.slow
 def test_third_mode_is_a_third_mode(tmp_path):
     changes = third_mode(read_vehicle_file(AS504 / "vehicle.toml"))
     folder = rebuilt(AS504, tmp_path / "three", construction={"bending_modes": 3}, changes=changes)

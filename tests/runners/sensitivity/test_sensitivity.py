@@ -297,6 +297,7 @@ def test_a_value_that_is_no_number_is_refused(as504, value):
         as504.with_parameters({"control.T1.gain": value})
 
 
+@pytest.mark.slow
 def test_nothing_follows_the_linear_mean_in_secret(cache, tmp_path):
     """A vehicle that asks for the nonlinear mean is refused where only the linear one is known."""
     study = Study.load("as504", changes={"options.mean_response": "nonlinear"})

@@ -98,6 +98,7 @@ def test_halving_the_substep_quarters_the_error(study):
     assert 3.0 < errors[0] / errors[1] < 5.5
 
 
+@pytest.mark.slow
 def test_steps_of_as504_meet_the_adjoint(as504):
     """Behind a gain switch too; far below the sampling error of any ensemble one would run."""
     times = [40.0, 75.0, 110.0]

@@ -111,6 +111,7 @@ BIASES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", [(), ("slosh_reaction", "local_angle_of_attack"), ("p_delta",)])
 def test_rows_are_those_of_the_moment_that_is_an_output_there(folder, options):
     """Coefficient by coefficient, from the left where the flight jumps: C and G u of the outputs."""
@@ -130,6 +131,7 @@ def test_rows_are_those_of_the_moment_that_is_an_output_there(folder, options):
         load_rows(study, times, [25.0, 26.0])
 
 
+@pytest.mark.slow
 def test_covariance_equation_gives_the_same_without_a_compiler(folder):
     study = Study.load(folder, compile=False)
     along = loads_along_vehicle(study, TIMES[:1], engine=CovarianceEquation(1e-7))

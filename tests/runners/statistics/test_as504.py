@@ -31,6 +31,7 @@ def test_adjoint_meets_the_covariance_equation(as504, forward, method, iteration
     np.testing.assert_allclose(found.mean.values[:, :, 0], forward.mean, rtol=1e-5, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_the_default_tolerance_keeps_the_promise(as504, forward):
     found = as504.response_statistics(TIMES[:4])
     np.testing.assert_allclose(found.variance.values[:, :, :3], forward.variance[:4], rtol=1e-5)

@@ -84,6 +84,7 @@ def test_open_gives_back_what_was_saved(statistics, tmp_path):
     assert (tmp_path / "twice" / "statistics.csv").read_bytes() == (tmp_path / "statistics.csv").read_bytes()
 
 
+@pytest.mark.slow
 def test_other_files_have_one_unit_a_variable(as504, tmp_path):
     from ascentwind.runners.present.netcdf import write_netcdf
 
