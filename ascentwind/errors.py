@@ -6,6 +6,7 @@ __getattr__, __dir__, __all__ = _lazy.attach(
     "ascentwind",
     submod_attrs={
         "codegen.ensemble.compiled": ["EnsembleNeedsCompilerError"],
+        "codegen.export.source": ["ExportError"],
         "codegen.toolchain.c_printer": ["UnsupportedOperationError"],
         "codegen.toolchain.cache": ["CacheError", "CacheWarning"],
         "codegen.toolchain.compiler": ["CompilerError"],

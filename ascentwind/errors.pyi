@@ -1,4 +1,5 @@
 from .codegen.ensemble.compiled import EnsembleNeedsCompilerError as EnsembleNeedsCompilerError
+from .codegen.export.source import ExportError as ExportError
 from .codegen.toolchain.c_printer import UnsupportedOperationError as UnsupportedOperationError
 from .codegen.toolchain.cache import CacheError as CacheError
 from .codegen.toolchain.cache import CacheWarning as CacheWarning

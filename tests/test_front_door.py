@@ -30,6 +30,7 @@ EXAMPLES = {
     "BatchError": lambda: errors.BatchError({1: errors.IntegrationError("too fast")}, {0: sweep_result()}),
     "CompilerError": lambda: errors.CompilerError(["cc", "-O3"], 1, "no such file"),
     "DataError": lambda: errors.DataError("is odd", file=Path("vehicle.toml"), column="mass", row=3, time=1.5),
+    "ExportError": lambda: errors.ExportError("has no end", time=3.0),
     "GroupedFactorError": lambda: errors.GroupedFactorError("aerodynamics"),
     "InfeasibleDesignError": lambda: errors.InfeasibleDesignError("damping", 0.1, 0.05, {"gain": 1.0}),
     "LimitError": lambda: errors.LimitError("is no limit", file=Path("limit.csv"), column="bending_moment"),

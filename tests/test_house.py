@@ -18,7 +18,7 @@ FLOORS = (
     ("runners.solvers",),
     ("runners.case", "runners.wind", "runners.construct"),
     ("runners.statistics",),
-    ("runners.sensitivity", "runners.station_loads"),
+    ("runners.sensitivity", "runners.station_loads", "runners.export"),
     ("runners.flight_load", "runners.gusts"),
     ("runners.design_wind",),
     ("runners.measured_winds",),

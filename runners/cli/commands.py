@@ -20,6 +20,7 @@ FILES = {  # command: its file in this folder, where a function or a group of th
     "mean": "mean",
     "inspect": "views",
     "equations": "views",
+    "export": "export",
     "study": "study",
     "design": "design",
     "vehicles": "vehicles",

@@ -35,6 +35,7 @@ TAKE_CHANGES = [
     ["flight-load", "as504"],
     ["gust", "as504"],
     ["fly", "as504", "wind.csv"],
+    ["export", "as504", "--format", "c"],
     ["inspect", "as504", "--time", "70"],
     ["equations"],
     ["regenerate", "as504"],

@@ -80,6 +80,7 @@ KNOWN = {
     },
     "gust": {"shape", "response", "amplitude", "length", "times", "out", "turbulence", "changes"},
     "fly": {"times", "response", "levels", "component", "sign", "out", "changes"},
+    "export": {"format", "out", "times", "turbulence", "changes"},
     "vehicles": set(),
     "new-vehicle": {"source"},
     "inspect": {"time", "json", "changes"},
