@@ -400,8 +400,8 @@ def _load_turbulence(entry: TurbulenceEntry | None, wind: WindModel, reader: _Re
         intensity, file = turbulence_intensity(entry.severity), reader.toml
     else:
         csv = reader.read("wind.turbulence", entry.intensity, TURBULENCE, ALTITUDE)
-        columns, file = (csv.columns[name] for name in ("altitude", "sigma")), csv.file
-        intensity = Table(INTENSITY, "m/s", *columns, entry.intensity.interpolation)
+        altitude, sigma, file = csv.columns["altitude"], csv.columns["sigma"], csv.file
+        intensity = Table(INTENSITY, "m/s", altitude, sigma, entry.intensity.interpolation)
     high_pass, length = None if entry.high_pass_m == "none" else entry.high_pass_m, entry.length_m
     low, high = (float(x) for x in wind.mean.argument[[0, -1]])
     if high_pass is not None and high_pass > high - low:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
-from scipy.optimize import brentq
+from scipy.optimize import root_scalar
 from scipy.special import ndtri
 from scipy.stats import norm
 
@@ -115,4 +115,5 @@ def mixture_level(means: NDArray[np.float64], std: float, chance: float) -> floa
     def passed(level: float) -> float:
         return float(np.mean(norm.sf((level - means) / std) + norm.cdf((-level - means) / std))) - chance
 
-    return float(brentq(passed, 0.0, largest + 10 * std, xtol=1e-12 * (largest + std)))
+    bracket = (0.0, largest + 10 * std)
+    return float(root_scalar(passed, bracket=bracket, method="brentq", xtol=1e-12 * (largest + std)).root)

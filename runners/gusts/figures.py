@@ -37,7 +37,7 @@ def gust_figure(sweeps: Sequence[GustSweep], responses: Sequence[xr.Dataset], na
         above, below = figure.subplots(2)
         for sweep, each, over_time, color in zip(sweeps, worst, responses, SHADES, strict=False):
             of_time = sweep.dataset["largest"].sel(response=name)
-            largest = factor * np.abs(of_time).max("time")
+            largest = factor * abs(of_time).max("time")
             above.plot(sweep.lengths, largest, color=color, lw=2, label=words(sweep.gust.name))
             above.plot(each.gust.length, factor * abs(each.value), "o", color=color)
             values = over_time["response_to_gust"].sel(response=name)

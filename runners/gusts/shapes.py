@@ -288,7 +288,7 @@ def _rise(distance: NDArray[np.float64], over: float) -> NDArray[np.float64]:
     return 0.5 * (1 - np.cos(np.pi * np.clip(distance / over, 0.0, 1.0)))
 
 
-def _check(gust: Gust) -> None:
+def _check(gust: OneMinusCosine | QuasiSquare | RampAndHold) -> None:
     """Raise if a length or an amplitude is none."""
     for what, value in (("length", gust.length), ("amplitude", gust.amplitude)):
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):

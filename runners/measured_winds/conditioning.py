@@ -27,16 +27,16 @@ class Measured:
     @cached_property
     def _root(self) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
         size = np.sqrt(np.diagonal(self.covariance))
-        unit = np.where(size > 0, size, 1.0)
+        unit = np.asarray(np.where(size > 0, size, 1.0), float)
         correlation = self.covariance / np.outer(unit, unit)
         for jitter in JITTER:
             try:
-                return np.linalg.cholesky(correlation + jitter * np.eye(size.size)), unit, jitter
+                return np.asarray(np.linalg.cholesky(correlation + jitter * np.eye(size.size)), float), unit, jitter
             except np.linalg.LinAlgError:
                 continue
         values, vectors = np.linalg.eigh(correlation)
-        factor = np.linalg.qr((vectors * np.sqrt(np.maximum(values, JITTER[-1]))).T)[1].T
-        return factor, unit, JITTER[-1]
+        roots = np.sqrt(np.maximum(values, JITTER[-1]))
+        return np.linalg.qr((vectors * roots).T)[1].T, unit, JITTER[-1]
 
     @property
     def condition(self) -> float:

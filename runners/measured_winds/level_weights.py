@@ -172,7 +172,8 @@ def _steps(case: Case, climb: Climb, nodes: NDArray, levels: NDArray) -> tuple[N
         times = np.concatenate([*fine, [piece.end]])
         parts.append((times[:-1], times[1:], np.full(times.size - 1, piece.low), np.full(times.size - 1, piece.high)))
     if not parts:
-        return (np.zeros(0),) * 2 + (np.array([start]),) * 2
+        none, at_start = np.zeros(0), np.array([start])
+        return none, none, at_start, at_start
     begin, end, low, high = (np.concatenate(column) for column in zip(*parts, strict=True))
     return begin, end, low, high
 

@@ -68,7 +68,7 @@ class Soundings:
     @property
     def complete(self) -> NDArray[np.bool_]:
         """Which profiles hold all levels, (n,)."""
-        return np.isfinite(self.u).all(axis=1) & np.isfinite(self.v).all(axis=1)
+        return np.asarray((np.isfinite(self.u) & np.isfinite(self.v)).all(axis=1))
 
     @property
     def period(self) -> str:

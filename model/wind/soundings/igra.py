@@ -85,8 +85,8 @@ def _whole(line: str, first: int, last: int, file: Path, row: int, what: str) ->
 
 def _time(head: str, file: Path, row: int) -> tuple[datetime.datetime, bool]:
     year, month, day, hour = (
-        _whole(head, *columns, file, row, what)
-        for *columns, what in ((14, 17, "year"), (19, 20, "month"), (22, 23, "day"), (25, 26, "hour"))
+        _whole(head, first, last, file, row, what)
+        for first, last, what in ((14, 17, "year"), (19, 20, "month"), (22, 23, "day"), (25, 26, "hour"))
     )
     try:
         return datetime.datetime(year, month, day, 0 if hour == NO_HOUR else hour), hour != NO_HOUR

@@ -40,8 +40,9 @@ class RawLevels:
         self, line: int, pressure: float, height: float, temperature: float, speed: float, direction: float
     ) -> None:
         """Add a level: any unit of pressure, m, deg C, m/s, deg."""
+        self.line.append(line)
         for values, value in (
-            (self.line, line), (self.pressure, pressure), (self.height, height),
+            (self.pressure, pressure), (self.height, height),
             (self.temperature, temperature), (self.speed, speed), (self.direction, direction),
         ):  # fmt: skip
             values.append(value)

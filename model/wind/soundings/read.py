@@ -229,7 +229,7 @@ def at_levels(
             quality.notes.append(f"{len(faults)} {what}: {_listed(faults, profiles, levels)}")
     for fault in [*codes, *bad]:
         u[fault.profile, fault.level] = v[fault.profile, fault.level] = np.nan
-    whole = np.isfinite(u).all(axis=1)
+    whole = np.asarray(np.isfinite(u).all(axis=1))
     if incomplete == "refuse" and not whole.all():
         i = int(np.argmin(whole))
         h = levels[int(np.argmin(np.isfinite(u[i])))]
@@ -237,8 +237,8 @@ def at_levels(
             f"lacks the level ({int((~whole).sum())} of {whole.size} profiles are incomplete); interpolate it, or take "
             "incomplete='use' or 'drop'", file=profiles[i].file or None, sounding=profiles[i].name, altitude=float(h),
         )  # fmt: skip
-    keep = whole if incomplete == "drop" else np.isfinite(u).any(axis=1)
-    for i in np.flatnonzero(~keep):
+    keep: NDArray[np.bool_] = whole if incomplete == "drop" else np.asarray(np.isfinite(u).any(axis=1))
+    for i in np.flatnonzero(~keep).tolist():
         missing = levels[~np.isfinite(u[i])]
         quality.dropped.append(
             (

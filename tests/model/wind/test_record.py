@@ -347,7 +347,9 @@ def test_turbulence_goes_with_any_wind(falcon, no_fit):
     toml.write_text(toml.read_text().replace("[options]", f"{asked}\n[options]"))
     applied(falcon)
     assert asked in toml.read_text()
-    assert quiet(falcon).turbulence.length == 400.0
+    turbulence = quiet(falcon).turbulence
+    assert turbulence is not None
+    assert turbulence.length == 400.0
 
 
 def test_a_wind_is_written_whole_or_not_at_all(falcon, no_fit, monkeypatch):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import datetime
 import importlib.util
 import zipfile
+from typing import Any
 
 import numpy as np
 import pytest
@@ -124,16 +125,17 @@ def test_places_in_a_field(tmp_path):
     field["u"].attrs["units"] = "m s**-1"
     file = tmp_path / "era5.nc"
     field.to_netcdf(file, engine="scipy")
-    at = dict(latitude=28.6, longitude=-80.8)  # 279.2
+    at: dict[str, Any] = {"latitude": 28.6, "longitude": -80.8}  # 279.2
     bilinear = read_soundings(file, LEVELS[1:-1], point="bilinear", largest_gap=4000.0, **at)
     nearest = read_soundings(file, LEVELS[1:-1], largest_gap=4000.0, **at)
     np.testing.assert_allclose(bilinear.u, u[:, 1:-1] + 0.2 + 0.8, atol=1e-9)
     np.testing.assert_allclose(nearest.u, u[:, 1:-1], atol=1e-9)
-    for wrong, says in (
+    cases: tuple[tuple[dict[str, Any], str], ...] = (
         ({}, "say which with latitude="),
         ({"latitude": 28.6}, "longitude="),
         ({"latitude": 40.0}, "40 deg is not"),
-    ):
+    )
+    for wrong, says in cases:
         with pytest.raises(SoundingError, match=says):
             read_soundings(file, LEVELS, **wrong)
 
@@ -384,12 +386,13 @@ def test_a_library_that_is_missing_is_named(tmp_path, monkeypatch, start, librar
 def test_options_that_cannot_be_used(tmp_path):
     file = tmp_path / "s.csv"
     file.write_text(files.own_text(LEVELS, *winds(12)))
-    for options, says in (
+    cases: tuple[tuple[dict[str, Any], str], ...] = (
         ({"levels": [3.0, 2.0]}, "increasing"),
         ({"levels": [20000.0]}, "no profile holds any of the 1 levels"),
         ({"largest_gap": 0.0}, "not positive"),
         ({"latitude": 28.0}, "is of one place"),
-    ):
+    )
+    for options, says in cases:
         with pytest.raises(SoundingError, match=says):
             read_soundings(file, **options)
     with pytest.raises(UnknownNameError, match="incomplete"):

@@ -263,6 +263,7 @@ def test_turbulence_is_a_deviation_beside_the_wind(cache):
     found = study.design_wind("angle_of_attack", TIME, combined=True)
     statistics = study.response_statistics([TIME], responses=["angle_of_attack"]).variance.squeeze()
     assert found.std**2 == pytest.approx(float(statistics.sel(source="combined")), rel=1e-6)
+    assert found.deviations is not None
     turbulence = found.deviations["deviation"].sel(source="turbulence")
     assert 1.0 < float(turbulence.isel(t=-1)) < 3 * 3.0
     with pytest.raises(aw.errors.DataError, match="correlation out"):

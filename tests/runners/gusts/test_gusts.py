@@ -191,7 +191,7 @@ BAD = [
     (lambda s: aw.OneMinusCosine(0.0), "no extent"),
     (lambda s: aw.OneMinusCosine(-60.0), "no extent"),
     (lambda s: aw.RampAndHold(math.nan), "length"),
-    (lambda s: aw.RampAndHold("60"), "length"),
+    (lambda s: aw.RampAndHold("60"), "length"),  # pyright: ignore[reportArgumentType]
     (lambda s: aw.OneMinusCosine(60.0, 0.0), "blows nothing"),
     (lambda s: aw.OneMinusCosine(60.0, math.inf), "amplitude"),
     (lambda s: aw.QuasiSquare(50.0), "no room"),

@@ -163,8 +163,8 @@ def test_many_at_once_are_each_alone():
 
 
 def test_what_does_not_vary_keeps_its_size():
-    assert NormOfNormal([3.0, 4.0], np.zeros((2, 2))).percentile() == 5.0
-    assert NormOfNormal([0.0, 0.0], np.zeros((2, 2))).percentile() == 0.0
+    assert NormOfNormal(np.array([3.0, 4.0]), np.zeros((2, 2))).percentile() == 5.0
+    assert NormOfNormal(np.zeros(2), np.zeros((2, 2))).percentile() == 0.0
 
 
 @pytest.mark.parametrize(
