@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import xarray as xr
 
@@ -17,6 +17,8 @@ from ..model.wind.soundings.sounding import Sounding
 from .case.case import Case
 from .case.times import end_times
 from .design_wind.design_wind import DesignWind, design_wind
+from .export.matrix_grid import default_grid, matrix_grid
+from .export.state_space import state_space
 from .flight_load.limit_table import Limits
 from .flight_load.limits import limit_passage
 from .flight_load.load import DESIGN, DRAWS, FlightLoad, flight_load
@@ -521,6 +523,53 @@ class Study(Case):
         NoVehicleError, DataError, SoundingError, UnknownNameError, TimeRangeError, DirectNoiseError
         """
         return fly(self, profiles, times, responses, component, sign)
+
+    def matrix_grid(self, times: Iterable[float] | None = None) -> xr.Dataset:
+        """Return the matrices A, B, C, D, E, G and the known inputs over time, with names and units.
+
+        A jump is there twice, a few roundings before and after it. ``grid.A.sel(time=75.0).to_pandas()`` is a labelled
+        frame.
+
+        Parameters
+        ----------
+        times : iterable of float, optional
+            s; the whole flight in steps of 0.05 s without it.
+
+        Returns
+        -------
+        xarray.Dataset
+            A (time, state_rate, state), B (time, state_rate, noise), C (time, response, state), D (time, response,
+            noise), E (time, state_rate, input), G (time, response, input), u (time, input), ``start_covariance``
+            (source, state_rate, state) and ``jump`` (s).
+
+        Raises
+        ------
+        TimeRangeError, ExportError
+        """
+        return matrix_grid(self, default_grid(self) if times is None else times)
+
+    def to_statespace(self, time: float, *, library: Literal["control", "scipy"] = "control") -> Any:
+        """Return the system frozen at a time as an object of a control library.
+
+        Its inputs are the white noises, then the known inputs; names are kept by python-control.
+
+        Parameters
+        ----------
+        time : float
+            s; at a jump after it.
+        library : {'control', 'scipy'}
+
+        Returns
+        -------
+        control.StateSpace or scipy.signal.StateSpace
+
+        Raises
+        ------
+        TimeRangeError, UnknownNameError
+        MissingLibraryError
+            python-control is not installed.
+        """
+        return state_space(self, time, library)
 
     def sensitivity(
         self,

@@ -12,30 +12,43 @@ from ..present.terminal import console
 from .job import Job, load_study
 from .terminal import Changes, Turbulence, VehicleArgument, results_folder
 
-FORMATS = ("c",)
+C = "c"
 
 
 def export(
     vehicle: VehicleArgument,
-    format: Annotated[str, typer.Option(help="c: a library with header, sources, numbers and examples.")],
+    format: Annotated[
+        str, typer.Option(help="c, a library; or matrices A, B, C, D, E, G over time: netcdf, mat (MATLAB) or csv.")
+    ],
     out: Annotated[Path | None, typer.Option(help="Folder; VEHICLE-FORMAT without it.")] = None,
     times: Annotated[
-        str | None, typer.Option(help="Times in s, START:STOP:STEP or T1,T2,...: end times of the library's example.")
+        str | None,
+        typer.Option(
+            help="START:STOP:STEP or T1,T2,... in s: of matrices, every 0.05 s without it; of the example of c."
+        ),
     ] = None,
     changes: Changes = None,
     turbulence: Turbulence = None,
 ) -> None:
-    """A vehicle's system with its numbers for others: a C library that needs neither Python nor ascentwind."""
+    """A vehicle's system with its numbers for others: a C library, or its matrices over time."""
     from ..case.times import parse_times
     from ..export.c_library import c_library, write_texts
+    from ..export.matrix_files import FORMATS, write_matrices
 
-    if format not in FORMATS:
-        raise UnknownNameError("format", format, FORMATS)
+    if format not in (known := (C, *FORMATS)):
+        raise UnknownNameError("format", format, known)
     chosen = None if times is None else parse_times(times)
-    study = load_study(vehicle, changes, ["default_times"] if times is None else [], turbulence=turbulence)
+    shown = ["default_times"] if format == C and times is None else []
+    study = load_study(vehicle, changes, shown, turbulence=turbulence)
     job = Job(out or results_folder(vehicle, format))
-    with console.status("statistics, and the sources of the library"):
-        texts = c_library(study, chosen)
-    job.replace_earlier("export", study.system.name)
-    job.written += write_texts(texts, job.folder)
+    if format == C:
+        with console.status("statistics, and the sources of the library"):
+            texts = c_library(study, chosen)
+        job.replace_earlier("export", study.system.name)
+        job.written += write_texts(texts, job.folder)
+    else:
+        with console.status("matrices"):
+            grid = study.matrix_grid(chosen)
+        job.replace_earlier("export", study.system.name)
+        job.written += write_matrices(grid, format, job.folder, study.system.name)
     job.end()

@@ -7,45 +7,24 @@ import shutil
 import subprocess
 from pathlib import Path
 
-import casadi as ca
 import numpy as np
 import pytest
+from jumping_system import END, GAIN, JUMP, TAU, jumping_system
 
 from ascentwind.codegen.export.source import ExportError, c_string, library_prefix
 from ascentwind.codegen.toolchain.compiler import find_compiler, optimizing
-from ascentwind.model import define_system
 from ascentwind.runners import Study
 from ascentwind.runners.export.c_library import c_library, write_texts
 
-TAU, GAIN, JUMP, END = 2.0, 3.0, 3.0, 8.0
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror")
 OK, NULL, NO_TIMES, NAN_TIME, ORDER, OFF, TOLERANCE, SPACING = range(8)
 INPUT_FAILED = 13
 needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
 
 
-def system(name: str = "1 läg", end: float = END):
-    """x' = -x/tau + gain (n + u), its gain doubled after a jump, shakes an oscillator; one response is white."""
-    t, x, y, v, n, m, u, tau = (ca.SX.sym(s) for s in ("t", "x", "y", "v", "n", "m", "u", "tau"))
-    gain = ca.if_else(t < JUMP, GAIN, 2 * GAIN)
-    return define_system(
-        name,
-        time=t,
-        states={"x": (x, -x / tau + gain * (n + u)), "y": (y, v), "v": (v, -9 * y - 0.6 * v + x + 0.5 * m)},
-        noises={"n": n, "m": m},
-        sources={"n": "gust", "m": 'bu"mp'},
-        outputs={"x": x, "y, in \\ it": 2 * y + u, "white": v + m},
-        inputs={"u": (u, 1.5)},
-        parameters={"tau": (tau, TAU)},
-        units={"x": "m", "tau": "s"},
-        start_covariance={"gust": np.diag([0.25, 0.0, 0.0])},
-        end=end,
-    )
-
-
 @pytest.fixture(scope="module")
 def study(cache) -> Study:
-    return Study.from_system(system())
+    return Study.from_system(jumping_system())
 
 
 @pytest.fixture(scope="module")
@@ -238,14 +217,14 @@ def test_examples_build_without_a_warning_and_run_clean(folder, tmp_path, compil
 
 def test_the_table_needs_no_compiler(monkeypatch):
     monkeypatch.setenv("CC", "")
-    texts = c_library(Study.from_system(system("plain")), [1.0])
+    texts = c_library(Study.from_system(jumping_system("plain")), [1.0])
     assert {"plain.h", "plain.c", "plain_sweep.c", "Makefile", "CMakeLists.txt", "README.md"} <= texts.keys()
     assert "example_history.c" not in texts  # no measured wind without a vehicle
 
 
 def test_a_system_without_end_is_refused():
     with pytest.raises(ExportError, match="has no end"):
-        c_library(Study.from_system(system(end=float("inf")), compile=False))
+        c_library(Study.from_system(jumping_system(end=float("inf")), compile=False))
 
 
 @pytest.mark.parametrize(
