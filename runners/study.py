@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 import xarray as xr
+from numpy.typing import ArrayLike
 
 from ..codegen.sweep.compiled import sweep_of
 from ..model.errors import IntegrationError, ParameterValueError
@@ -15,6 +16,7 @@ from ..model.system.names import COMBINED
 from ..model.wind.soundings.collection import Soundings
 from ..model.wind.soundings.sounding import Sounding
 from .case.case import Case
+from .case.climb import Climb
 from .case.times import end_times
 from .design_wind.design_wind import DesignWind, design_wind
 from .export.matrix_grid import default_grid, matrix_grid
@@ -23,10 +25,16 @@ from .flight_load.limit_table import Limits
 from .flight_load.limits import limit_passage
 from .flight_load.load import DESIGN, DRAWS, FlightLoad, flight_load
 from .flight_load.passage import Passage
+from .flight_load.window import checked_window
 from .gusts.response import gust_response
 from .gusts.search import GustSweep, gust_sweep
 from .gusts.shapes import Gust, OneMinusCosine
+from .measured_winds.day_of_launch import ERROR, THRESHOLD, Balloon, DayOfLaunch, day_of_launch
 from .measured_winds.fly import FlownWinds, fly
+from .measured_winds.persistence import Persistence
+from .measured_winds.predictor import predict_wind
+from .measured_winds.profiles import across
+from .measured_winds.wind_field import measured_persistence, wind_field
 from .sensitivity.check import check_sensitivity
 from .sensitivity.many import sensitivities
 from .sensitivity.one import sensitivity
@@ -570,6 +578,120 @@ class Study(Case):
             python-control is not installed.
         """
         return state_space(self, time, library)
+
+    def day_of_launch(
+        self,
+        soundings: Balloon | Sequence[Balloon],
+        hours_before: float | Sequence[float],
+        *,
+        limits: str | Path | Limits | None = None,
+        window: tuple[float, float] | None = None,
+        responses: Iterable[str] | None = None,
+        persistence: Persistence | None = None,
+        error: float = ERROR,
+        threshold: float = THRESHOLD,
+        sides: Sides = "both",
+        draws: int = DRAWS,
+        seed: int = 0,
+        component: str | None = None,
+        sign: int = 1,
+    ) -> DayOfLaunch:
+        """Return what winds measured before a launch say of its responses and limits.
+
+        Parameters
+        ----------
+        soundings : path, Sounding or Soundings, or a sequence of them
+            Of one time each. Levels outside the flight are not used, nor those within 50 m of the one below.
+        hours_before : float or sequence of float
+            Between each and the launch, h.
+        limits : path or Limits, optional
+            Of responses over time; needed for a probability.
+        window : (float, float), optional
+            As for :meth:`flight_load`, s.
+        responses : iterable of str, optional
+            Those with a limit without it, or all.
+        persistence : Persistence, optional
+            By wavelength and lag; without it the correlation after 24 h is that measured at Cape Canaveral in March,
+            and how it grows at shorter lags and falls for shorter waves is assumed.
+        error : float
+            Standard deviation of a measured wind, m/s, independent by level.
+        threshold : float
+            Probability of passing a limit above which it is no-go.
+        sides : {'both', 'upper', 'lower'}
+        draws : int
+            Paths of the importance sampling.
+        seed : int
+        component : {'zonal', 'meridional'}, optional
+            As for :meth:`fly`.
+        sign : {1, -1}
+
+        Returns
+        -------
+        DayOfLaunch
+            ``mean``, ``std`` (time, response), ``wind``, ``probability``, ``go``, ``margin_in_sigmas()``, ``update``.
+
+        Raises
+        ------
+        NoVehicleError, SoundingError, DataError, LimitError, ParameterValueError, UnknownNameError, TimeRangeError
+
+        Warns
+        -----
+        CertainPassageWarning
+        """
+        return day_of_launch(
+            self, soundings, hours_before, limits, window, responses, persistence, error, threshold, sides, draws, seed,
+            component, sign,
+        )  # fmt: skip
+
+    def predict_wind(
+        self, altitude: ArrayLike, wind: ArrayLike, ahead: ArrayLike, *, error: float = ERROR
+    ) -> xr.Dataset:
+        """Return the wind ahead from the wind below, by a Kalman filter over altitude.
+
+        Parameters
+        ----------
+        altitude : (k,) array_like
+            Where it was measured, increasing, m.
+        wind : (k,) array_like
+            Along the vehicle's +Y, m/s.
+        ahead : (j,) array_like
+            Altitudes above the last one, increasing, m.
+        error : float
+            Standard deviation of a measurement, m/s.
+
+        Returns
+        -------
+        xarray.Dataset
+            ``predicted``, ``std`` and ``band`` (ahead); ``one_step`` (altitude) from the levels below each, and the
+            ``gain`` (altitude, state).
+
+        Raises
+        ------
+        NoVehicleError, ParameterValueError
+        """
+        return predict_wind(self, altitude, wind, ahead, error)
+
+    def persistence(self, soundings: Soundings, component: str | None = None) -> Persistence:
+        """Return how long winds last by one's own soundings, for :meth:`day_of_launch`.
+
+        Parameters
+        ----------
+        soundings : Soundings
+            With hours in their dates; pairs of any lag up to 48 h, 20 at least.
+        component : {'zonal', 'meridional'}, optional
+            That across the flight without it.
+
+        Returns
+        -------
+        Persistence
+
+        Raises
+        ------
+        NoVehicleError, SoundingError, ParameterValueError, DataError, UnknownNameError
+        """
+        which, _ = across(self, component, 1)
+        top = float(Climb.of(self).altitude(checked_window(self, None)[1]))
+        return measured_persistence(wind_field(self, top), soundings, which)
 
     def sensitivity(
         self,

@@ -17,7 +17,7 @@ import ascentwind as aw
 UNDERLINED = re.compile(r"^(\w[\w ]*)\n-{3,}$", re.MULTILINE)
 # a unit, in words that there is none, or where it stands
 UNIT = re.compile(
-    r"As for|As there|\b(s|m|kg|N|rad|deg|Hz|SI|seconds|relative|probability|unit|share|factor)\b", re.IGNORECASE
+    r"As for|As there|\b(s|h|m|kg|N|rad|deg|Hz|SI|seconds|relative|probability|unit|share|factor)\b", re.IGNORECASE
 )
 
 

@@ -14,6 +14,7 @@ FILES = {  # command: its file in this folder, where a function or a group of th
     "flight-load": "flight_load",
     "gust": "gust",
     "fly": "fly",
+    "day-of-launch": "day_of_launch",
     "verify": "checks",
     "tolerance": "checks",
     "sensitivity": "sensitivity",

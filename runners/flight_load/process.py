@@ -167,21 +167,7 @@ class OneOutput:
 
     @cached_property
     def _factor(self) -> NDArray[np.float64]:
-        """The lower factor L of R = L L', zero where nothing varies."""
-        varies = np.flatnonzero(self.std[:, 0] > 0)
-        std = self.std[varies, 0]
-        correlation = self.covariance[np.ix_(varies, varies)] / np.outer(std, std)
-        factor = np.zeros_like(self.covariance)
-        for jitter in JITTER:
-            try:
-                root = np.linalg.cholesky(correlation + jitter * np.eye(varies.size))
-            except np.linalg.LinAlgError:
-                continue
-            factor[np.ix_(varies, varies)] = std[:, None] * root
-            return factor
-        values, vectors = np.linalg.eigh(correlation)
-        factor[np.ix_(varies, varies)] = std[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
-        return factor
+        return _root(self.covariance)
 
     def deviations(self, random: np.random.Generator, count: int) -> NDArray[np.float64]:
         """Return drawn deviations from the mean, (count, m, r)."""
@@ -268,6 +254,25 @@ def one_output(
         found = [_halving(band, stride // 2**k) for k in range(halvings)]
     lags = (np.diagonal(R, lag)[:, None] for lag in (0, 1, 2))
     return OneOutput(drawn, seen, R, tuple(found), _unseen(*lags))
+
+
+def _root(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return a factor L of a covariance L L' (k, k), lower where it can be, zero where nothing varies."""
+    spread = np.sqrt(np.maximum(np.diagonal(covariance), 0.0))
+    varies = np.flatnonzero(spread > 0)
+    std = spread[varies]
+    correlation = covariance[np.ix_(varies, varies)] / np.outer(std, std)
+    factor = np.zeros_like(covariance)
+    for jitter in JITTER:
+        try:
+            root = np.linalg.cholesky(correlation + jitter * np.eye(varies.size))
+        except np.linalg.LinAlgError:
+            continue
+        factor[np.ix_(varies, varies)] = std[:, None] * root
+        return factor
+    values, vectors = np.linalg.eigh(correlation)
+    factor[np.ix_(varies, varies)] = std[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
+    return factor
 
 
 def _unseen(
@@ -448,4 +453,92 @@ class ManyOutputs:
         return np.ascontiguousarray((states / self._scale @ self._rows_on_scale).swapaxes(0, 1))
 
 
-Process = OneOutput | ManyOutputs
+@dataclass(frozen=True, eq=False)
+class JointOutputs:
+    """Few outputs by their covariance between all times, such as after something was measured: no chain makes them.
+
+    Attributes
+    ----------
+    drawn : Grid
+    covariance : (m, r, m, r) array
+    """
+
+    drawn: Grid
+    covariance: NDArray[np.float64]
+
+    @property
+    def seen(self) -> Grid:
+        return self.drawn
+
+    @property
+    def stride(self) -> int:
+        return 1
+
+    @cached_property
+    def std(self) -> NDArray[np.float64]:
+        """Standard deviation at the points drawn, (m, r)."""
+        return np.sqrt(np.maximum(np.einsum("mrmr->mr", self.covariance), 0.0))
+
+    @cached_property
+    def between(self) -> NDArray[np.float64]:
+        """How far a path goes between two points drawn without being seen at either, (m, r)."""
+        own = np.einsum("mrnr->rmn", self.covariance)
+        lags = (np.diagonal(own, lag, axis1=1, axis2=2).T for lag in (0, 1, 2))
+        return _unseen(*lags)
+
+    def restricted(self, points: slice, outputs: NDArray[np.intp]) -> JointOutputs | None:
+        """Return the process at some consecutive points drawn and of some outputs; None where that saves nothing."""
+        grid = self.drawn
+        part = Grid(grid.times[points], grid.mean[points][:, outputs], grid.diffusion[points][:, outputs])
+        return JointOutputs(part, self.covariance[points][:, outputs][:, :, points][..., outputs])
+
+    @cached_property
+    def _factor(self) -> NDArray[np.float64]:
+        return _root(self.covariance.reshape(self.std.size, self.std.size))
+
+    def deviations(self, random: np.random.Generator, count: int) -> NDArray[np.float64]:
+        """Return drawn deviations from the mean, (count, m, r)."""
+        return (random.standard_normal((count, self.std.size)) @ self._factor.T).reshape(count, *self.std.shape)
+
+    def covariances(self, points: NDArray[np.intp], outputs: NDArray[np.intp]) -> NDArray[np.float64]:
+        """Return covariances of everything with chosen outputs at chosen points, (len(points), m, r)."""
+        return self.covariance[points, outputs]
+
+    def steps_near(
+        self, deviations: NDArray[np.float64], near: NDArray[np.bool_], random: np.random.Generator
+    ) -> tuple[Steps, Steps]:
+        """Return the steps of drawn deviations, conditioned or not, beside points ``near`` (count, m).
+
+        On the grid seen, and on every second point of it.
+        """
+        return Steps.of(deviations, near), Steps.of_every_second(deviations, near)
+
+
+def joint_covariance(
+    chain: MarkovChain, row: NDArray[np.float64], sources: Sequence[int] | None = None
+) -> NDArray[np.float64]:
+    """Return the covariance of outputs between all times of a chain, (m, r, m, r).
+
+    Parameters
+    ----------
+    chain : MarkovChain
+    row : (m, r, n) array
+        Of the outputs over the states.
+    sources : sequence of int, optional
+        Numbers of those that act; all without it.
+    """
+    P = chain.covariance(sources)
+    m, r, n = row.shape
+    found = np.zeros((m * r, m * r))
+    columns = np.zeros((n, m * r))  # Phi(t_k, t_j) P(t_j) C(t_j)' for all j up to k
+    for k in range(m):
+        now, before = slice(k * r, (k + 1) * r), slice(0, k * r)
+        if k:
+            columns[:, before] = chain.transition[k - 1] @ columns[:, before]
+        columns[:, now] = P[k] @ row[k].T
+        found[now, : (k + 1) * r] = row[k] @ columns[:, : (k + 1) * r]
+        found[: (k + 1) * r, now] = found[now, : (k + 1) * r].T
+    return found.reshape(m, r, m, r)
+
+
+Process = OneOutput | ManyOutputs | JointOutputs

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -292,9 +292,5 @@ def fly(
     names = case.checked_responses(responses)
     soundings = soundings_of(profiles)
     complete = complete_profiles(case, soundings, float(Climb.of(case).altitude(ends[-1])), component, sign)
-    return FlownWinds(case, tuple(names), complete, weights_for(case, names, ends, complete.levels), soundings.day)
-
-
-def weights_for(case: Case, names: Sequence[str], ends: list[float], levels: NDArray[np.float64]) -> LevelWeights:
-    """Return the weights of some responses at levels (m) and end times (s)."""
-    return level_weights(case, ends, levels).of([case.system.output_index(name) for name in names])
+    weights = level_weights(case, ends, complete.levels, names)
+    return FlownWinds(case, tuple(names), complete, weights, soundings.day)

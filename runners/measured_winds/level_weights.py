@@ -63,14 +63,11 @@ class LevelWeights:
         m, r, k = self.weight.shape
         return (wind @ self.weight.reshape(m * r, k).T).reshape(*wind.shape[:-1], m, r) + self.rest
 
-    def of(self, rows: Sequence[int]) -> LevelWeights:
-        """Return those of some responses, by number."""
-        rows = list(rows)
-        return LevelWeights(self.times, self.levels, self.weight[:, rows], self.rest[:, rows], self.altitude)
 
-
-def level_weights(case: Case, times: Sequence[float], levels: NDArray[np.float64]) -> LevelWeights:
-    """Return the weights of all responses, kept with the case.
+def level_weights(
+    case: Case, times: Sequence[float], levels: NDArray[np.float64], responses: Sequence[str]
+) -> LevelWeights:
+    """Return the weights of some responses, kept with the case.
 
     Parameters
     ----------
@@ -80,16 +77,18 @@ def level_weights(case: Case, times: Sequence[float], levels: NDArray[np.float64
         End times, increasing, s.
     levels : (k,) array
         Of profiles, increasing, m.
+    responses : sequence of str
 
     Raises
     ------
     NoVehicleError, DataError, TimeRangeError
     """
-    question = ("level weights", tuple(times), tuple(levels.tolist()))
-    return case.kept(question, lambda: _level_weights(case, times, levels))
+    rows = [case.system.output_index(name) for name in responses]
+    question = ("level weights", tuple(times), tuple(levels.tolist()), tuple(rows))
+    return case.kept(question, lambda: _level_weights(case, times, levels, rows))
 
 
-def _level_weights(case: Case, times: Sequence[float], levels: NDArray[np.float64]) -> LevelWeights:
+def _level_weights(case: Case, times: Sequence[float], levels: NDArray[np.float64], rows: list[int]) -> LevelWeights:
     climb, executable = Climb.of(case), case.with_means
     system, n = executable.system, len(executable.system.states)
     nodes = time_nodes(executable, times)
@@ -100,7 +99,7 @@ def _level_weights(case: Case, times: Sequence[float], levels: NDArray[np.float6
         MatrixEvaluator(executable, ("A", "E", "inputs")),
         MatrixEvaluator(executable, ("C", "G", "inputs")),
     )
-    k, r = levels.size, len(system.output_names)
+    k, r = levels.size, len(rows)
     X, rest = np.zeros((n, k)), np.zeros(n)
     weight, of_rest = np.zeros((nodes.size, r, k)), np.zeros((nodes.size, r))
     done = 0
@@ -108,7 +107,7 @@ def _level_weights(case: Case, times: Sequence[float], levels: NDArray[np.float6
     def read(node: float, low: float, high: float) -> None:
         nonlocal done
         C, G, inputs = outputs(node, low, high)
-        G = G.copy()
+        C, G = C[rows] * scale, G[rows]
         others = inputs[:, 0].copy()
         others[wind] = 0.0
         phi = np.zeros(k)
@@ -116,8 +115,8 @@ def _level_weights(case: Case, times: Sequence[float], levels: NDArray[np.float6
         phi[i] += 1 - share
         phi[min(i + 1, k - 1)] += share
         while done < nodes.size and nodes[done] <= node:
-            weight[done] = (C * scale) @ X + np.outer(G[:, wind], phi)
-            of_rest[done] = (C * scale) @ rest + G @ others
+            weight[done] = C @ X + np.outer(G[:, wind], phi)
+            of_rest[done] = C @ rest + G @ others
             done += 1
 
     if nodes[0] <= system.start:

@@ -36,6 +36,7 @@ TAKE_CHANGES = [
     ["gust", "as504"],
     ["fly", "as504", "wind.csv"],
     ["export", "as504", "--format", "c"],
+    ["day-of-launch", "as504", "--sounding", "wind.csv", "--hours-before", "3", "--limit", "limit.csv"],
     ["inspect", "as504", "--time", "70"],
     ["equations"],
     ["regenerate", "as504"],
@@ -53,6 +54,7 @@ def changes_asked_for(monkeypatch, tmp_path):
     """Return with which changes a command loads its vehicle."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "design.toml").write_text(DESIGN)
+    (tmp_path / "limit.csv").write_text("time [s],bending_moment [N m]\n0,2e7\n150,2e7\n")
     (tmp_path / "wind.csv").write_text("altitude [m],u [m/s],v [m/s]\n0,3,0\n9000,30,0\n")
 
     def load(vehicle, *, compile=True, changes=None):
@@ -65,7 +67,7 @@ def changes_asked_for(monkeypatch, tmp_path):
         assert isinstance(found.exception, Asked), found.output
         vehicle, changes = found.exception.args
         assert vehicle == "as504"
-        assert {p.name for p in tmp_path.iterdir()} == {"design.toml", "wind.csv"}, (
+        assert {p.name for p in tmp_path.iterdir()} == {"design.toml", "limit.csv", "wind.csv"}, (
             "a folder was made before the vehicle is known"
         )
         return changes

@@ -12,6 +12,7 @@ from ascentwind.runners.cli.app import app
 
 SOUNDINGS = ["--soundings", "none.csv"]
 APPLY = ["wind", "apply", ".", "--component", "zonal", "--azimuth", "0", "--site", "x"]
+LAUNCH = ["day-of-launch", "as504", "--sounding", "s.csv", "--hours-before", "3", "--limit", "limit.csv"]
 DESIGN = """format = 1
 vehicle = "as504"
 times = "70,75"
@@ -33,6 +34,9 @@ UNUSED = [
     ([*APPLY, *SOUNDINGS, "--period", "may"], "--period is not used with --soundings"),
     ([*APPLY, *SOUNDINGS, "--edition", "2006"], "--edition is not used with --soundings"),
     (["wind", "stats", "--normality", "here"], "--normality is not used without --soundings"),
+    ([*LAUNCH, "--sign", "-1"], "--sign is not used without --component"),
+    ([*LAUNCH, "--exponent", "1"], "--exponent is not used without --lasts"),
+    ([*LAUNCH, "--lasts", "50", "--pairs", "p.csv"], "--pairs and --lasts both say"),
     (["fly", "as504", "none.csv", "--sign", "-1"], "--sign is not used without --component"),
     (["wind", "read", "none.csv", "--point", "bilinear"], "--point is not used without --latitude"),
     (["equations", "as504", "--page", "p.md", "--of", "4-1"], "--of is not used with --page"),
@@ -81,6 +85,10 @@ KNOWN = {
     "gust": {"shape", "response", "amplitude", "length", "times", "out", "turbulence", "changes"},
     "fly": {"times", "response", "levels", "component", "sign", "out", "changes"},
     "export": {"format", "out", "times", "turbulence", "changes"},
+    "day-of-launch": {
+        "sounding", "hours_before", "limit", "window", "threshold", "error", "pairs", "lasts", "exponent", "sides",
+        "component", "sign", "draws", "seed", "out", "changes",
+    },
     "vehicles": set(),
     "new-vehicle": {"source"},
     "inspect": {"time", "json", "changes"},

@@ -69,7 +69,7 @@ def test_a_file_of_one_profile_is_flown(as504, tmp_path):
 def test_the_mean_wind_at_its_own_levels_gives_nearly_the_mean(as504):
     """Straight lines every 10 m against the monotone cubic of the mean's table."""
     levels = np.unique(np.concatenate([np.arange(150.0, 30001.0, 10.0), as504.vehicle.wind.mean.argument]))
-    weights = level_weights(as504, TIMES, levels)
+    weights = level_weights(as504, TIMES, levels, as504.system.output_names)
     found = weights.responses(random_wind(as504, levels).mean)
     wanted = as504.response_statistics(TIMES).mean.sel(source="combined").transpose("time", "response").values
     scale = np.abs(wanted).max(axis=0)

@@ -1,0 +1,157 @@
+"""One page for the launch console: go or no-go, what drives it, and a figure of wind and responses."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.figure import Figure
+
+from ..present.style import COLORS, SHADES, STYLE, display, words, wrapped
+from .day_of_launch import BAND, DayOfLaunch
+from .persistence import EXPONENTS
+from .wind_field import default_persistence
+
+CAVEAT = (
+    "Gaussian winds: changes of wind have heavier tails (excess kurtosis of 24-h changes at the Cape up to 1.9), so "
+    "that small chances are too small. Errors of the wind's filter and of the vehicle's model are not in them."
+)
+
+
+def bracket(launch: DayOfLaunch) -> list[tuple[float, float]]:
+    """Return the exponents of growth with lag that bracket what is assumed, and the chance of passing with each.
+
+    Empty where the persistence was given or measured.
+
+    Parameters
+    ----------
+    launch : DayOfLaunch
+    """
+    if "assumed" not in launch.persistence.source or "at the Cape" not in launch.persistence.source:
+        return []
+    field = launch.flight.field
+    return [
+        (p, launch.with_persistence(default_persistence(field, launch.component, p)).probability) for p in EXPONENTS
+    ]
+
+
+def drivers(launch: DayOfLaunch) -> list[str]:
+    """Return sentences on what drives the chance: which limit, when, where, and of which uncertainty.
+
+    Parameters
+    ----------
+    launch : DayOfLaunch
+    """
+    passage, told = launch.passage, []
+    chance, climb = passage.by_load.values, launch.flight.weights
+    margin = launch.margin_in_sigmas()
+    taken = launch.flight.std**2 - launch.std**2
+    by_wind = (launch.flight.by_wave**2).sum(axis=2) - taken
+    for k in np.argsort(-chance):
+        name = passage.loads[int(k)].name
+        r = launch.responses.index(name)
+        at = int(np.nanargmin(margin[:, r]))
+        factor, unit = display(passage.loads[int(k)].unit, launch.limit()[:, r])
+        share = float(np.clip(by_wind[at, r] / launch.std[at, r] ** 2, 0, 1)) if launch.std[at, r] > 0 else 0.0
+        told.append(
+            f"{words(name)}: passed by {chance[k]:.2g} of flights; nearest at {launch.times[at]:.1f} s, "
+            f"{climb.altitude[at] / 1000:.1f} km: expected {factor * launch.mean[at, r]:.4g}, one sigma "
+            f"{factor * launch.std[at, r]:.3g}, limit {factor * launch.limit()[at, r]:.4g} {unit}, {margin[at, r]:.1f} "
+            f"sigma off; {100 * share:.0f} % of that variance is wind that may still change or was not seen, the rest "
+            "the vehicle's and what is finer than 25 m"
+        )
+    return told
+
+
+def launch_page(launch: DayOfLaunch, title: str) -> str:
+    """Return the page as Markdown.
+
+    Parameters
+    ----------
+    launch : DayOfLaunch
+        With limits.
+    title : str
+    """
+    p, season = launch.passage.probability, launch.climatological_passage.probability
+    low, high = p.interval
+    lines = [
+        f"# {'GO' if launch.go else 'NO-GO'}: {title}",
+        "",
+        f"- Chance of passing any limit: **{p.value:.2g}** (95 % of the sampling: {low:.2g} to {high:.2g}; threshold "
+        f"{launch.threshold:g})",
+        f"- Of the season, nothing measured: {season.value:.2g}",
+        *(f"- With growth of winds' change by lag to the power {q:.2g}: {chance:.2g}" for q, chance in bracket(launch)),
+        *(f"- Measured: {name}" for name in launch.balloons.names),
+        f"- {launch.balloons.altitude.size} levels from {launch.balloons.altitude.min():.0f} to "
+        f"{launch.balloons.altitude.max():.0f} m, error {launch.error:g} m/s",
+        "",
+        "## What drives it",
+        "",
+        *(f"- {sentence}" for sentence in drivers(launch)),
+        "",
+        "## What it rests on",
+        "",
+        f"- Persistence: {launch.persistence.source}",
+        f"- {CAVEAT}",
+        "",
+        "![wind and responses](day_of_launch.png)",
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def launch_figure(launch: DayOfLaunch, title: str) -> Figure:
+    """Return the wind at launch over altitude, and responses over time with band and limits.
+
+    Parameters
+    ----------
+    launch : DayOfLaunch
+    title : str
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    shown = launch.responses[:3]
+    with rc_context(STYLE):
+        figure = Figure(figsize=(11.0, 2.6 + 2.4 * len(shown)), layout="constrained")
+        grid = figure.add_gridspec(len(shown), 2, width_ratios=(1.0, 1.6))
+        axes = figure.add_subplot(grid[:, 0])
+        found = launch.wind
+        h, mean, std = found["altitude"].values / 1000, found["mean"].values, found["std"].values
+        season, wide = found["climatology"].values, BAND * found["climatological_std"].values
+        axes.fill_betweenx(h, season - wide, season + wide, color="#bbbbbb", alpha=0.35, lw=0, label="season, 90 %")
+        axes.plot(season, h, color=COLORS["mean"], lw=1)
+        axes.fill_betweenx(h, mean - BAND * std, mean + BAND * std, color=COLORS["wind"], alpha=0.3, lw=0,
+                           label="at launch, 90 %")  # fmt: skip
+        axes.plot(mean, h, color=COLORS["wind"], lw=1.6)
+        for hours, color in zip(np.unique(launch.balloons.hours)[::-1], SHADES[1:], strict=False):
+            i = launch.balloons.hours == hours
+            axes.plot(launch.balloons.wind[i], launch.balloons.altitude[i] / 1000, ".", ms=3, color=color,
+                      label=f"measured {hours:g} h before")  # fmt: skip
+        axes.set(xlabel="wind along +Y (m/s)", ylabel="altitude (km)", ylim=(0, h[-1]))
+        axes.legend(fontsize=8)
+        limit = launch.limit()
+        for k, name in enumerate(shown):
+            panel, r = figure.add_subplot(grid[k, 1]), launch.responses.index(name)
+            unit = launch.flight.case.system.outputs[launch.flight.case.system.output_index(name)].unit
+            factor, unit = display(unit, np.abs(launch.mean[:, r]) + launch.std[:, r])
+            for m, s, color, strength, label in (
+                (launch.flight.mean[:, r], launch.flight.std[:, r], "#bbbbbb", 0.35, "season, 90 %"),
+                (launch.mean[:, r], launch.std[:, r], COLORS["wind"], 0.3, "at launch, 90 %"),
+            ):
+                panel.fill_between(launch.times, factor * (m - BAND * s), factor * (m + BAND * s), color=color,
+                                   alpha=strength, lw=0, label=label)  # fmt: skip
+            panel.plot(launch.times, factor * launch.mean[:, r], color=COLORS["wind"], lw=1.6)
+            if np.isfinite(limit[:, r]).all():
+                for side in {"both": (1, -1), "upper": (1,), "lower": (-1,)}[launch.sides]:
+                    panel.plot(launch.times, side * factor * limit[:, r], color=COLORS["combined"], lw=1.8,
+                               label="limit" if side == 1 or launch.sides == "lower" else None)  # fmt: skip
+            panel.set(ylabel=f"{words(name)} ({unit})", xlim=(launch.times[0], launch.times[-1]))
+            if not k:
+                panel.legend(fontsize=8, ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.0))
+        panel.set_xlabel("flight time (s)")
+        told = ""
+        if launch.limits is not None:
+            told = f"\n{'GO' if launch.go else 'NO-GO'}: {launch.probability:.2g} of flights pass a limit"
+        figure.suptitle(wrapped(f"{title}{told}"))
+    return figure
