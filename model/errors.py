@@ -115,6 +115,23 @@ class TimeRangeError(AscentwindError):
     """A time was asked for that the flight or its tables do not cover."""
 
 
+class PlanesError(AscentwindError):
+    """Something was asked of a vehicle in both planes that is known for one alone.
+
+    Parameters
+    ----------
+    what : str
+        Begins the sentence.
+    vehicle : str
+    """
+
+    def __init__(self, what: str, vehicle: str):
+        super().__init__(
+            f"{what} is known for one plane alone, and '{vehicle}' flies in both; ask it of planes = \"yaw\" or "
+            'planes = "pitch"'
+        )
+
+
 class DirectNoiseError(AscentwindError):
     """White noise reaches an output directly, so that its variance would be infinite."""
 

@@ -1,35 +1,33 @@
-"""Puts the blocks together: vehicle, control, bending, slosh, wind filter and noise as one linear system."""
+"""Puts the planes of a vehicle together with the wind filter and the deviations as one linear system."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import casadi as ca
 import numpy as np
 
-from ..system.labels import Noise, State, block_of
+from ..system.labels import Noise, Output, State, block_of
 from ..system.linear_system import LinearSystem
 from ..system.names import TURBULENCE, UNDISTURBED, WIND
-from ..vehicle.biases import WIND_BIAS, check_biases
+from ..vehicle.biases import check_biases
+from ..vehicle.planes import flown_planes
 from ..vehicle.vehicle import Vehicle
-from . import rigid_body
+from ..wind.record import COMPONENTS
 from .block import Block
-from .control_law import control_law
-from .coupling import Accelerations
-from .deviations import Undeviated, deviated
-from .forces import Handles, solved_motion
-from .motion import Motion
 from .noise import NoiseProcess, deviation_block
-from .outputs import outputs
+from .plane import PlaneEquations, Winds, plane_equations
 from .structure import structure_in_words
 from .turbulence import start_covariance, turbulence_block
-from .typical_sizes import SCALES
-from .vehicle_numbers import Numbers
+from .vehicle_numbers import Numbers, Shared
 from .wind import WindBlock, wind_block
 
 
 def assemble(vehicle: Vehicle, wind_start_covariance: np.ndarray) -> LinearSystem:
     """Return the linear system of a vehicle in its wind.
+
+    In both planes it is the equations of each, one after the other, which meet in the wind filter and in the deviations
+    that they have in common.
 
     Parameters
     ----------
@@ -43,115 +41,100 @@ def assemble(vehicle: Vehicle, wind_start_covariance: np.ndarray) -> LinearSyste
         If a noise source deviates a table that the mean response cannot carry, or a bias has nothing to act on.
     """
     check_biases(vehicle)
-    numbers = Numbers.of(vehicle)
-    motion, tables, deviations = Motion.of(numbers.modes, numbers.tanks), numbers.tables, numbers.deviations
-    mean_wind, handles = ca.SX.sym("mean_wind"), Handles.new()
-    winds, start = _winds(vehicle, numbers), {WIND: ca.SX(ca.DM(wind_start_covariance))}
-    if vehicle.turbulence and numbers.turbulence:
-        start[TURBULENCE] = start_covariance(vehicle.turbulence, numbers.turbulence)
-    solved = solved_motion(vehicle, numbers, motion, handles)
-    control = control_law(numbers, motion, solved)
-    expected = numbers.mean_scale * tables["wind.mean"]
-    met = sum((part.wind for part in winds.values()), ca.SX(0)) + mean_wind
-    if WIND_BIAS in deviations:
-        met += deviations[WIND_BIAS].deviation * expected
-    alpha = rigid_body.angle_of_attack(tables, motion.attitude, motion.lateral_velocity, met)
-    blocks = [
-        *_rigid_body(motion, solved),
-        *control.blocks,
-        *_bending(motion, solved),
-        *_slosh(motion, solved, numbers.tanks),
-        *(Block.numbered(source, part.states, part.derivative) for source, part in winds.items()),
-        *(deviation_block(name, process) for name, process in deviations.items()),
-        *_position(vehicle, motion),
-    ]
-    responses = outputs(vehicle, numbers, motion, solved, handles)
-    states = tuple(state for block in blocks for state in block.states)
-    x = ca.vertcat(*(block.symbols for block in blocks))
-    equations = Undeviated(
-        x,
-        rates=ca.vertcat(*(block.rates for block in blocks)),
-        outputs=ca.vertcat(*(value for _, value in responses)),
-        angles=ca.vertcat(alpha, control.engine_angle),
-        responses=tuple(label.name for label, _ in responses),
-        handles=handles,
+    shared, planes = Shared.of(vehicle), flown_planes(vehicle)
+    numbers = [Numbers.of(plane, shared) for plane in planes]
+    names, tables = _input_names(len(planes)), shared.tables
+    met = _winds(vehicle, numbers)
+    turbulence = met[TURBULENCE].winds if TURBULENCE in met else (ca.SX(0),) * len(planes)
+    winds = Winds(
+        met[WIND].winds,
+        tuple(ca.SX.sym(f"mean_{name}") for name in names),
+        tuple(numbers[0].mean_scale * tables[f"wind.mean{name.removeprefix(WIND)}"] for name in names),
     )
-    derivative, output = deviated(vehicle, numbers, motion, equations)
-    has_axial = any(load.axial for load in vehicle.file.loads)
+    parts = [plane_equations(*of_plane, winds) for of_plane in zip(planes, numbers, turbulence, strict=True)]
+    processes = shared.processes
+    blocks = [
+        *(block for part in parts for block in part.blocks),
+        *(Block.numbered(source, part.states, part.derivative) for source, part in met.items()),
+        *(deviation_block(name, process) for name, (_, process) in processes.items()),
+        *(block for part in parts for block in part.positions),
+    ]
+    states = tuple(state for block in blocks for state in block.states)
+    labels, output = _outputs(parts)
+    expected = ca.vertcat(*winds.expected)
+    known = any(
+        ca.depends_on(ca.vertcat(part.output, *(b.rates for b in part.blocks)), shared.undisturbed) for part in parts
+    )
     return LinearSystem(
         name=vehicle.name,
-        time=numbers.time,
-        x=x,
-        w=ca.vertcat(*(part.white for part in winds.values()), *(process.white for process in deviations.values())),
-        u=ca.vertcat(mean_wind, numbers.undisturbed) if has_axial else mean_wind,
-        p=numbers.parameters.vector,
+        time=shared.time,
+        x=ca.vertcat(*(block.symbols for block in blocks)),
+        w=ca.vertcat(*(part.white for part in met.values()), *(process.white for _, process in processes.values())),
+        u=ca.vertcat(*winds.mean, shared.undisturbed) if known else ca.vertcat(*winds.mean),
+        p=shared.parameters.vector,
         v=tables.vector,
-        derivative=derivative,
+        derivative=ca.vertcat(*(block.rates for block in blocks)),
         output=output,
         states=states,
-        noises=_white_noises(winds, deviations),
-        outputs=tuple(label for label, _ in responses),
-        parameters=tuple(numbers.parameters.parameters),
-        input_names=(WIND, UNDISTURBED) if has_axial else (WIND,),
-        input_values=ca.vertcat(expected, 1) if has_axial else expected,
-        tables=numbers.groups,
-        start_covariance=_start_covariance(states, start, deviations),
+        noises=_white_noises(met, processes),
+        outputs=labels,
+        parameters=tuple(shared.parameters.parameters),
+        input_names=(*names, UNDISTURBED) if known else names,
+        input_values=ca.vertcat(expected, 1) if known else expected,
+        tables=shared.groups,
+        start_covariance=_start_covariance(states, _of_winds(vehicle, numbers, wind_start_covariance), processes),
         discontinuities=vehicle.discontinuities,
         start=vehicle.start,
         end=vehicle.end,
-        coupling_matrix=solved.matrix,
-        structure=structure_in_words(vehicle, len(states), numbers.groups),
+        coupling_matrix=ca.diagcat(*(part.matrix for part in parts)),
+        structure=structure_in_words(vehicle, len(states), shared.groups),
     )
 
 
-def _rigid_body(motion: Motion, solved: Accelerations) -> tuple[Block, ...]:
-    return (
-        Block.of("lateral_velocity", motion.lateral_velocity, solved.lateral, "m/s", SCALES["lateral_velocity"]),
-        Block.of("attitude", motion.attitude, motion.attitude_rate, "rad", SCALES["angle"]),
-        Block.of("attitude_rate", motion.attitude_rate, solved.rotation, "rad/s", SCALES["angle"]),
-    )
+def _input_names(planes: int) -> tuple[str, ...]:
+    return (WIND,) if planes == 1 else tuple(f"{WIND}_{component}" for component in COMPONENTS)
 
 
-def _bending(motion: Motion, solved: Accelerations) -> tuple[Block, ...]:
-    return (
-        Block.numbered("bending", motion.eta, motion.eta_rate, "m", SCALES["bending"]),
-        Block.numbered("bending_rate", motion.eta_rate, solved.bending, "m/s", SCALES["bending_rate"]),
-    )
+def _outputs(parts: Sequence[PlaneEquations]) -> tuple[tuple[Output, ...], ca.SX]:
+    """Return the outputs of all planes; what belongs to none, as a force along the axis, stands once."""
+    found: dict[Output, ca.SX] = {}
+    for part in parts:
+        for i, label in enumerate(part.labels):
+            found.setdefault(label, part.output[i])
+    return tuple(found), ca.vertcat(*found.values())
 
 
-def _slosh(motion: Motion, solved: Accelerations, tanks: Sequence[str]) -> tuple[Block, ...]:
-    names, rates = ([f"{kind}_{tank}" for tank in tanks] for kind in ("slosh", "slosh_rate"))
-    return (
-        Block.of("slosh", motion.xi, motion.xi_rate, "m", SCALES["slosh"], names),
-        Block.of("slosh_rate", motion.xi_rate, solved.slosh, "m/s", SCALES["slosh_rate"], rates),
-    )
-
-
-def _position(vehicle: Vehicle, motion: Motion) -> tuple[Block, ...]:
-    """Return the lateral position, a state where it is an output."""
-    if "lateral_drift" not in vehicle.file.options.extra_outputs:
-        return ()
-    scale = SCALES["lateral_position"]
-    return (Block.of("lateral_position", motion.lateral_position, motion.lateral_velocity, "m", scale),)
-
-
-def _winds(vehicle: Vehicle, numbers: Numbers) -> dict[str, WindBlock]:
-    """Return what is random in the wind that is met, by source."""
-    tables, rate = numbers.tables, numbers.tables["altitude_rate"]
-    found = {WIND: wind_block(vehicle.wind.shaping_filter, tables, rate, numbers.sigma_scale)}
-    if vehicle.turbulence and numbers.turbulence:
+def _winds(vehicle: Vehicle, numbers: Sequence[Numbers]) -> dict[str, WindBlock]:
+    """Return what is random in the wind that is met, by source; turbulence has a wind of its own for each plane."""
+    one = numbers[0]
+    rate = one.tables["altitude_rate"]
+    found = {WIND: wind_block(vehicle.wind, one.tables, rate, one.sigma_scale)}
+    if vehicle.turbulence and one.turbulence:
         driver = found[WIND].white[0]
-        found[TURBULENCE] = turbulence_block(vehicle.turbulence, numbers.turbulence, tables, rate, driver)
+        parts = [turbulence_block(vehicle.turbulence, one.turbulence, one.tables, rate, driver) for _ in numbers]
+        columns = ([getattr(part, name) for part in parts] for name in ("states", "derivative", "white"))
+        found[TURBULENCE] = WindBlock(*(ca.vertcat(*c) for c in columns), tuple(part.winds[0] for part in parts))
     return found
 
 
-def _white_noises(winds: Mapping[str, WindBlock], deviations: Iterable[str]) -> tuple[Noise, ...]:
+def _of_winds(vehicle: Vehicle, numbers: Sequence[Numbers], wind: np.ndarray) -> dict[str, ca.SX]:
+    """Return the covariance of the winds' states at the start, by source."""
+    found = {WIND: ca.SX(ca.DM(wind))}
+    turbulence = numbers[0].turbulence
+    if vehicle.turbulence and turbulence:
+        found[TURBULENCE] = ca.diagcat(*(start_covariance(vehicle.turbulence, turbulence) for _ in numbers))
+    return found
+
+
+def _white_noises(
+    winds: Mapping[str, WindBlock], processes: Mapping[str, tuple[str, NoiseProcess]]
+) -> tuple[Noise, ...]:
     of_winds = (Noise(f"{source}_{i + 1}", source) for source, part in winds.items() for i in range(part.white.numel()))
-    return (*of_winds, *(Noise(name, name) for name in deviations))
+    return (*of_winds, *(Noise(name, source) for name, (source, _) in processes.items()))
 
 
 def _start_covariance(
-    states: Sequence[State], winds: Mapping[str, ca.SX], deviations: dict[str, NoiseProcess]
+    states: Sequence[State], winds: Mapping[str, ca.SX], processes: Mapping[str, tuple[str, NoiseProcess]]
 ) -> dict[str, ca.SX | np.ndarray]:
     """Return the covariance at the start by source: of the winds' states as given, of a deviation one."""
     found: dict[str, ca.SX | np.ndarray] = {}
@@ -159,9 +142,10 @@ def _start_covariance(
         whole, rows = ca.SX(len(states), len(states)), block_of(states, source)
         whole[rows, rows] = given
         found[source] = np.array(ca.evalf(whole)) if whole.is_constant() else whole
-    for name, process in deviations.items():
-        found[name] = np.zeros((len(states), len(states)))
-        for state in deviation_block(name, process).states:
-            row = states.index(state)
-            found[name][row, row] = 1.0
+    for source in dict.fromkeys(source for source, _ in processes.values()):
+        ones = np.zeros(len(states))
+        for name, (of, process) in processes.items():
+            for state in deviation_block(name, process).states if of == source else ():
+                ones[states.index(state)] = 1.0
+        found[source] = np.diag(ones)
     return found

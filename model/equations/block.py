@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi as ca
 
@@ -37,3 +37,8 @@ class Block:
     def numbered(block: str, symbols: ca.SX, rates: ca.SX, unit: str = "1", scale: float = 1.0) -> Block:
         """Return a block whose states are counted from 1."""
         return Block.of(block, symbols, rates, unit, scale, [f"{block}_{i + 1}" for i in range(symbols.numel())])
+
+    def named(self, prefix: str) -> Block:
+        """Return the block with ``prefix`` in front of the names of its states and its own."""
+        states = tuple(replace(s, name=prefix + s.name, block=prefix + s.block) for s in self.states)
+        return self if not prefix else Block(states, self.symbols, self.rates)

@@ -12,7 +12,7 @@ from ..vehicle.biases import CENTER_OF_GRAVITY_OFFSET, THRUST_MISALIGNMENT, vehi
 from ..vehicle.loads import SIDES, lateral_loads, load_name
 from ..vehicle.noise_loads import CENTER_OF_PRESSURE, deviating_tables, loading_deviations
 from ..vehicle.vehicle import Vehicle
-from .forces import Handles
+from .forces import Handles, aerodynamic_angle
 from .motion import Motion
 from .noise_loads import noise_load
 from .vehicle_numbers import Numbers
@@ -129,7 +129,8 @@ def _direct(vehicle: Vehicle, name: str, numbers: Numbers, motion: Motion, equat
         coefficients = numbers.tables.under(f"loads.{load.output}.")
         # a couple makes no shear but by the vehicle's answer to it, wherever it acts
         where = "couple_aft" if load.is_shear and form == "couple_forward" else form
-        value = noise_load(loading, where, coefficients, numbers.tables, numbers.area, motion.alpha, motion.beta)
+        angles = aerodynamic_angle(numbers, motion), motion.beta
+        value = noise_load(loading, where, coefficients, numbers.tables, numbers.area, *angles)
         column[rows[load.output]] = value
     for moment, radius in numbers.radii.items():
         for side, sign in SIDES.items():

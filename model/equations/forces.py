@@ -52,6 +52,12 @@ class Handles:
         return ca.vertcat(0, 0, tables["thrust"])
 
 
+def aerodynamic_angle(numbers: Numbers, motion: Motion) -> ca.SX:
+    """Return the angle of attack from where the normal force is zero, rad: what C'_N and M'_alpha multiply."""
+    zero = numbers.zero_force_angle
+    return motion.alpha if zero.is_zero() else motion.alpha + zero
+
+
 def solved_motion(vehicle: Vehicle, numbers: Numbers, motion: Motion, handles: Handles) -> Accelerations:
     """Return Y'', phi_Z'', eta'' and xi'' (4-1, 4-2, 4-8, 4-11, 4-12).
 
@@ -62,7 +68,8 @@ def solved_motion(vehicle: Vehicle, numbers: Numbers, motion: Motion, handles: H
         The vehicle's symbols.
     """
     options, tables, tanks, modes = vehicle.file.options, numbers.tables, numbers.tanks, numbers.modes
-    area, alpha, beta, attitude = numbers.area, motion.alpha, motion.beta, motion.attitude
+    area, beta, attitude = numbers.area, motion.beta, motion.attitude
+    alpha = aerodynamic_angle(numbers, motion)
     eta, eta_rate = motion.eta, motion.eta_rate
     slopes, slosh_mass = bending.slopes(tables, modes, tanks), slosh.tank_column(tables, tanks, "mass")
     force = rigid_body.lateral_force(tables, area, alpha, beta, attitude)

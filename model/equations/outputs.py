@@ -12,7 +12,7 @@ from ..vehicle.noise_loads import component_deviations
 from ..vehicle.vehicle import Vehicle
 from ..vehicle.vehicle_file import ExtraOutput, LoadEntry
 from .coupling import Accelerations
-from .forces import Handles
+from .forces import Handles, aerodynamic_angle
 from .load_components import load_components
 from .loads import (
     axial_force,
@@ -70,7 +70,7 @@ def _lateral(
     handles: Handles,
 ) -> Value:
     tables, tanks, options, name = numbers.tables, numbers.tanks, vehicle.file.options, load.output
-    angles = motion.alpha, motion.beta
+    angles = aerodynamic_angle(numbers, motion), motion.beta
     if load.is_shear:
         value = shear_force(tables, name, tanks, forward, *angles, solved.bending, solved.slosh)
     else:

@@ -10,12 +10,13 @@ from dataclasses import dataclass
 
 import casadi as ca
 
+from ..vehicle.planes import flown_planes
 from ..vehicle.vehicle import Vehicle
 from . import bending, rigid_body, slosh
 from .control_law import engine_angle
 from .loads import bending_moment
 from .motion import Motion, named
-from .vehicle_numbers import Numbers
+from .vehicle_numbers import Numbers, Shared
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +51,8 @@ def report_equations(vehicle: Vehicle) -> dict[str, ReportEquation]:
     4-1, 4-2, 4-8 and 4-12 are solved for the acceleration; 4-5 to 4-7 are the networks over the Laplace variable s;
     4-9 and 4-10 are the two parts of the force on the mode in 4-8, and 4-11 the third.
     """
-    numbers = Numbers.of(vehicle)
+    plane = flown_planes(vehicle)[-1]
+    vehicle, numbers = plane.vehicle, Numbers.of(plane, Shared.of(vehicle))
     equations = _Equations(numbers, Motion.of(numbers.modes, numbers.tanks))
     found = [*equations.rigid_body(), *equations.control()]
     if numbers.modes:

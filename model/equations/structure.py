@@ -8,7 +8,21 @@ from ..tables import TableGroup
 from ..vehicle.biases import vehicle_biases
 from ..vehicle.loads import load_outputs
 from ..vehicle.noise_loads import deviating_tables
+from ..vehicle.planes import SECTIONS, own_tables, plane_entry
 from ..vehicle.vehicle import Vehicle
+from ..vehicle.vehicle_file import VehicleFile
+
+
+def _planes(file: VehicleFile) -> str:
+    own = [f"{name} with its own {', '.join(own)}" for name in ("pitch", "yaw") if (own := _own(file, name))]
+    each = [name for name, noise in file.noise.items() if noise.planes == "each"] if file.planes == "both" else []
+    parts = [file.planes, f"wind {file.wind.pitch_wind} in pitch", *own, *(f"{name} in each" for name in each)]
+    return "; ".join(parts)
+
+
+def _own(file: VehicleFile, plane: str) -> list[str]:
+    entry = plane_entry(file, plane)
+    return [*own_tables(entry), *(section for section in SECTIONS if getattr(entry, section) is not None)]
 
 
 def structure_in_words(vehicle: Vehicle, states: int, groups: Sequence[TableGroup]) -> dict[str, str]:
@@ -18,6 +32,7 @@ def structure_in_words(vehicle: Vehicle, states: int, groups: Sequence[TableGrou
     relief = ", ".join(f"{n} of order {len(e.filter.denominator) - 1}" for n, e in file.control.load_relief.items())
     turbulence = vehicle.turbulence
     return {
+        **({} if file.planes == "yaw" else {"planes": _planes(file)}),
         **({"load relief": relief} if relief else {}),
         "bending modes": str(len(vehicle.bending)),
         "slosh tanks": ", ".join(t.name for t in vehicle.slosh) or "none",

@@ -67,7 +67,7 @@ def turbulence_block(
         low = z[A.shape[0]]
         derivative = ca.vertcat(derivative, rate * _corner(numbers) * (wave - low))
     wave = ca.DM(turbulence.row).T @ z
-    return WindBlock(z, derivative, own, numbers.sigma_scale * tables[INTENSITY] * wave)
+    return WindBlock(z, derivative, own, (numbers.sigma_scale * tables[INTENSITY] * wave,))
 
 
 def start_covariance(turbulence: Turbulence, numbers: TurbulenceNumbers) -> ca.SX:

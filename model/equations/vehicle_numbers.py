@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from functools import partial
 
 import casadi as ca
 
-from ..system.symbols import ParameterSymbols, TableSymbols
+from ..system.symbols import ParameterSymbols, SharedParameters, TableSymbols
 from ..tables import TableGroup
 from ..vehicle.biases import vehicle_biases
+from ..vehicle.columns import AZIMUTH_CHANGE, ZERO_ANGLE
+from ..vehicle.noise_loads import IN_PLACE
+from ..vehicle.planes import BOTH, Plane
 from ..vehicle.vehicle import Vehicle
 from .control import transfer_function_symbols
 from .load_relief import Sensor, sensor_symbols
@@ -19,8 +24,44 @@ from .vehicle_tables import vehicle_tables
 
 
 @dataclass(frozen=True, eq=False)
+class Shared:
+    """What the planes of a vehicle have in common: time, tables, parameters, and deviations that act in each.
+
+    Attributes
+    ----------
+    time, undisturbed : SX
+    groups : tuple of TableGroup
+    tables : TableSymbols
+    parameters : ParameterSymbols
+    processes : dict of str to (source, NoiseProcess)
+        By the name of their white noise.
+    """
+
+    time: ca.SX
+    undisturbed: ca.SX
+    groups: tuple[TableGroup, ...]
+    tables: TableSymbols
+    parameters: ParameterSymbols
+    processes: dict[str, tuple[str, NoiseProcess]] = field(default_factory=dict)
+
+    @staticmethod
+    def of(vehicle: Vehicle) -> Shared:
+        """Declare it."""
+        groups = vehicle_tables(vehicle)
+        tables = TableSymbols(tuple(name for group in groups for name in group.names))
+        return Shared(ca.SX.sym("t"), ca.SX.sym("undisturbed"), groups, tables, ParameterSymbols())
+
+    def process(self, source: str, plane: Plane, common: bool, made: Callable[[], NoiseProcess]) -> NoiseProcess:
+        """Return the deviation by a source in a plane: the one of both, or the plane's own."""
+        name = source if common or not plane.prefix else f"{source}_{plane.name}"
+        if name not in self.processes:
+            self.processes[name] = source, made()
+        return self.processes[name][1]
+
+
+@dataclass(frozen=True, eq=False)
 class Numbers:
-    """What is known of a vehicle at a time: table values, parameters, and what is made of them.
+    """What is known of a vehicle in one plane at a time: table values, parameters, and what is made of them.
 
     Attributes
     ----------
@@ -40,6 +81,8 @@ class Numbers:
         By source.
     sigma_scale, mean_scale : SX
         Factors on the wind's standard deviation and mean.
+    azimuth : SX
+        Of the flight at a time, rad; where two components of the wind are turned by it.
     sensors : dict of str to Sensor
         Of load relief.
     radii : dict of str to SX
@@ -63,6 +106,7 @@ class Numbers:
     biases: dict[str, NoiseProcess]
     sigma_scale: ca.SX
     mean_scale: ca.SX
+    azimuth: ca.SX
     sensors: dict[str, Sensor]
     radii: dict[str, ca.SX]
     undisturbed: ca.SX
@@ -73,17 +117,26 @@ class Numbers:
         """Noises and biases of the vehicle, by source."""
         return self.noises | self.biases
 
+    @property
+    def zero_force_angle(self) -> ca.SX:
+        """What is added to the angle of attack so that the normal force is C'_N times the sum (rad); mostly zero."""
+        if ZERO_ANGLE.name not in self.tables:
+            return ca.SX(0)
+        return self.tables[ZERO_ANGLE.name] / self.tables["normal_force_slope"] * self.undisturbed
+
     @staticmethod
-    def of(vehicle: Vehicle) -> Numbers:
-        """Declare the numbers of a vehicle."""
-        groups, parameters = vehicle_tables(vehicle), ParameterSymbols()
-        tables = TableSymbols(tuple(name for group in groups for name in group.names))
+    def of(plane: Plane, shared: Shared) -> Numbers:
+        """Declare the numbers of a plane."""
+        vehicle, tables = plane.vehicle, shared.tables.scoped(plane.scope) if plane.scope else shared.tables
+        parameters = shared.parameters
+        if plane.scope:
+            parameters = SharedParameters(parameters, lambda name: f"{plane.scope if plane.owns(name) else ''}{name}")
         modes, tanks = len(vehicle.bending), tuple(tank.name for tank in vehicle.slosh)
         return Numbers(
-            ca.SX.sym("t"),
+            shared.time,
             modes,
             tanks,
-            groups,
+            shared.groups,
             tables,
             parameters,
             area=parameters.add("reference_area", vehicle.file.reference_area_m2, "m2", "reference area A"),
@@ -96,10 +149,17 @@ class Numbers:
                 parameters.add(f"slosh.{t.name}.damping", t.damping, "1", f"damping ratio of slosh in {t.name}")
                 for t in vehicle.slosh
             ),
-            noises={n: noise_process(n, e, parameters) for n, e in vehicle.noise.items()},
-            biases={n: bias_process(b, parameters) for n, b in vehicle_biases(vehicle.file).items()},
+            noises={
+                n: shared.process(n, plane, e.planes == "common", partial(noise_process, n, e, parameters))
+                for n, e in vehicle.noise.items()
+            },
+            biases={
+                n: shared.process(n, plane, n not in IN_PLACE, partial(bias_process, b, parameters))
+                for n, b in vehicle_biases(vehicle.file).items()
+            },
             sigma_scale=parameters.add("wind.sigma_scale", 1.0, "1", "factor on the wind's standard deviation"),
             mean_scale=parameters.add("wind.mean_scale", 1.0, "1", "factor on the mean wind"),
+            azimuth=_azimuth(vehicle, tables, parameters),
             sensors=sensor_symbols(vehicle.file.control.load_relief, modes, tables, parameters),
             radii={
                 load.output: parameters.add(
@@ -108,9 +168,19 @@ class Numbers:
                 for load in vehicle.file.loads
                 if load.radius_m is not None
             },
-            undisturbed=ca.SX.sym("undisturbed"),
+            undisturbed=shared.undisturbed,
             turbulence=TurbulenceNumbers.of(vehicle.turbulence, parameters) if vehicle.turbulence else None,
         )
+
+
+def _azimuth(vehicle: Vehicle, tables: TableSymbols, parameters: ParameterSymbols) -> ca.SX:
+    if vehicle.file.planes != BOTH:
+        return ca.SX(0)
+    azimuth_deg = vehicle.file.wind.azimuth_deg
+    assert azimuth_deg is not None  # checked by load_vehicle
+    meaning = "azimuth of the flight, from north towards east"
+    azimuth = parameters.add("wind.azimuth", math.radians(azimuth_deg), "rad", meaning)
+    return azimuth + tables[AZIMUTH_CHANGE.name] if AZIMUTH_CHANGE.name in tables else azimuth
 
 
 def _column(entries: Iterable[ca.SX]) -> ca.SX:

@@ -7,10 +7,12 @@ from itertools import pairwise
 
 import numpy as np
 
+from ..errors import UnknownNameError
 from ..tables import TableGroup
+from ..vehicle.planes import flown_planes
 from ..vehicle.vehicle import Vehicle
 
-# tables of the mean response, all in rad, and the output or state that each holds
+# tables of the mean response in a plane, all in rad, and the output or state that each holds
 MEAN_TABLES = {
     "mean.angle_of_attack": ("output", "angle_of_attack"),
     "mean.engine_angle": ("output", "engine_angle"),
@@ -24,17 +26,31 @@ def vehicle_tables(vehicle: Vehicle) -> tuple[TableGroup, ...]:
     polynomials = [(t.name, t.unit, t.polynomial) for t in vehicle.tables.values()]
     polynomials.append(("altitude_rate", "m/s", vehicle.tables["altitude"].polynomial.derivative()))
     flight = TableGroup.from_polynomials("flight", "time", polynomials, vehicle.start, vehicle.end)
-    wind, mean = vehicle.wind.shaping_filter, vehicle.wind.mean
-    own = [mean, *wind.tables()]
+    wind = vehicle.wind.shaping_filter
+    own = [*vehicle.wind.means, *wind.tables()]
     if vehicle.turbulence is not None:
         own.append(vehicle.turbulence.intensity)
     over_altitude = [(t.name, t.unit, t.polynomial) for t in own]
     bottom, top = min(float(t.argument[0]) for t in own), max(float(t.argument[-1]) for t in own)
     wind_group = TableGroup.from_polynomials("wind", "altitude", over_altitude, bottom, top)
     knots = mean_knots(vehicle.start, vehicle.end, vehicle.discontinuities)
-    zero = np.zeros((knots.size - 1, 4, len(MEAN_TABLES)))
-    mean_group = TableGroup("mean", "time", tuple(MEAN_TABLES), ("rad",) * len(MEAN_TABLES), knots, zero, "mean")
+    names = tuple(f"{plane.scope}{name}" for plane in flown_planes(vehicle) for name in MEAN_TABLES)
+    zero = np.zeros((knots.size - 1, 4, len(names)))
+    mean_group = TableGroup("mean", "time", names, ("rad",) * len(names), knots, zero, "mean")
     return flight, wind_group, mean_group
+
+
+def mean_source(table: str) -> tuple[str, str]:
+    """Return whether a table of the mean response holds an 'output' or a 'state', and which."""
+    for name, (kind, what) in MEAN_TABLES.items():
+        if table == name or table.endswith(f".{name}"):
+            return kind, f"{table.removesuffix(name).removesuffix('.')}_{what}".removeprefix("_")
+    raise UnknownNameError("table of the mean", table, MEAN_TABLES)
+
+
+def is_mean(table: str) -> bool:
+    """Tell whether a table is of the mean response."""
+    return any(table == name or table.endswith(f".{name}") for name in MEAN_TABLES)
 
 
 def mean_knots(start: float, end: float, discontinuities: Sequence[float]) -> np.ndarray:

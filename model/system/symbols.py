@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import casadi as ca
 
@@ -28,6 +28,26 @@ class ParameterSymbols:
         return ca.vertcat(ca.SX(0, 1), *self._symbols.values())
 
 
+class SharedParameters(ParameterSymbols):
+    """Parameters of one part of a system: those that another part has declared are shared with it.
+
+    Parameters
+    ----------
+    parameters : ParameterSymbols
+        Of the whole system.
+    name : callable
+        From a name in this part to the one in the system.
+    """
+
+    def __init__(self, parameters: ParameterSymbols, name: Callable[[str], str]):
+        self._symbols, self.parameters, self._name = parameters._symbols, parameters.parameters, name
+
+    def add(self, name: str, value: float, unit: str = "1", description: str = "") -> ca.SX:
+        """Return the symbol of a parameter, a new one where the system has none of the name."""
+        name = self._name(name)
+        return self._symbols[name] if name in self._symbols else super().add(name, value, unit, description)
+
+
 class TableSymbols:
     """Symbols of table values by name; ``tables['mass']``."""
 
@@ -35,10 +55,23 @@ class TableSymbols:
         self.vector = ca.SX.sym("v", len(names))
         self._index = {name: i for i, name in enumerate(names)}
 
+    def scoped(self, scope: str) -> TableSymbols:
+        """Return the tables as one part of a system sees them: its own, which begin with ``scope``, under plain names.
+
+        All others keep their names.
+        """
+        found = TableSymbols(())
+        own = {name.removeprefix(scope): i for name, i in self._index.items() if name.startswith(scope)}
+        found.vector, found._index = self.vector, self._index | own
+        return found
+
     def __getitem__(self, name: str) -> ca.SX:
         if name not in self._index:
             raise UnknownNameError("table", name, self._index)
         return self.vector[self._index[name]]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._index
 
     def under(self, prefix: str) -> Mapping[str, ca.SX]:
         """Return the tables whose name starts with ``prefix``, without it."""

@@ -81,12 +81,12 @@ def check_biases(vehicle: Vehicle) -> None:
     ------
     DataError
     """
-    nothing = {"wind": vehicle.wind.mean, "thrust": vehicle.tables["control_thrust"]}
+    nothing = {"wind": vehicle.wind.means, "thrust": (vehicle.tables["control_thrust"],)}
     for bias in vehicle_biases(vehicle.file).values():
-        if bias.key in nothing and not np.any(nothing[bias.key].values):
+        of = nothing.get(bias.key, ())
+        if of and not any(np.any(table.values) for table in of):
             raise DataError(
-                f"is a relative error, but '{nothing[bias.key].name}' is zero everywhere: a bias with no "
-                "spread; remove it",
+                f"is a relative error, but '{of[0].name}' is zero everywhere: a bias with no spread; remove it",
                 file=vehicle.folder / "vehicle.toml",
                 column=f"biases.{bias.key}",
             )

@@ -38,6 +38,9 @@ TRAJECTORY = (
     Column("axial_acceleration", "m/s2", "", "(thrust - axial_drag) / mass"),
     Column("axial_drag", "N", "", "air force along the axis, positive aft"),
 )
+AZIMUTH_CHANGE = Column(
+    "azimuth_change", "rad", "", "turn of the flight path's heading towards the right, from its azimuth"
+)
 PROPULSION = (
     Column("thrust", "N", "0", "of all engines"),
     Column("control_thrust", "N", "0", "of those that are gimballed; lateral force for each rad of engine angle"),
@@ -45,6 +48,12 @@ PROPULSION = (
 AERODYNAMICS = (
     Column("normal_force_slope", "1/rad", "", "C'_N of the whole vehicle on the reference area"),
     Column("center_of_pressure", "m", "", "where it acts, forward of the gimbal plane"),
+)
+ZERO_ANGLE = Column(
+    "normal_force_at_zero_angle",
+    "1",
+    "",
+    "C_N at angle of attack zero, spread as the slope is; where not symmetrical",
 )
 GAINS = (
     Column("attitude_factor", "1", "", "on T1(s), behind the network"),
@@ -61,6 +70,13 @@ WIND = (
     Column("standard_deviation", "m/s", "+", "of the wind about its mean"),
 )
 TURBULENCE = (Column("sigma", "m/s", "0", "standard deviation of turbulence"),)
+WIND_COMPONENTS = (
+    Column("mean_zonal", "m/s", "", "mean wind towards the east"),
+    Column("standard_deviation_zonal", "m/s", "+", "of that wind about its mean"),
+    Column("mean_meridional", "m/s", "", "mean wind towards the north"),
+    Column("standard_deviation_meridional", "m/s", "+", "of that wind about its mean"),
+    Column("correlation", "1", "", "of the two at the same altitude"),
+)
 
 # of a load, by which the rigid body answers slosh
 SECOND_MOMENT = Column(

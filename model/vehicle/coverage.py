@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +15,7 @@ from ..tables import Table
 from ..wind.propagation import standard_deviation
 from ..wind.record import WindRecord
 from ..wind.statistics import LARGEST_ALTITUDE, LARGEST_DEVIATION, WindModel
+from ..wind.two_components import TwoComponentFilter, TwoComponentWind, wind_correlation
 
 SHARE = 0.1  # of the peak dynamic pressure
 POINTS = 500
@@ -22,6 +23,7 @@ EVERY = 8  # of the points a standard deviation is compared
 MARGIN = 50.0  # m: statistics from the surface on need not begin at the launch pad
 LARGEST_DIFFERENCE = 0.1  # of the filter's own standard deviation from the table's, before it is told
 LARGEST_FACTOR = 2.0  # between both, before it is refused
+APART, LARGEST_APART = 0.15, 0.5  # of the correlations of two winds: filter and table, before it is told, or refused
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +75,47 @@ def check_schedule(name: str, table: Table, flight: LoadedFlight, file: Path) ->
             ),
             stacklevel=3,
         )
+
+
+def check_winds(wind: WindModel | TwoComponentWind, flight: LoadedFlight) -> None:
+    """Hold a wind of one or two components against the flight through it; see :func:`check_wind`."""
+    if isinstance(wind, WindModel):
+        check_wind(wind, flight)
+        return
+    for part in wind.components.values():
+        check_wind(replace(part, shaping_filter=replace(part.shaping_filter, origin=None), record=wind.record), flight)
+
+
+def check_joint_correlation(
+    filters: TwoComponentFilter, altitude: NDArray[np.float64], stated: NDArray[np.float64]
+) -> None:
+    """Hold the correlation that two filters give their winds at equal altitudes (m) against the table's.
+
+    Raises
+    ------
+    DataError
+        A correlation beyond 1, or further from the filters' than ``LARGEST_APART``.
+
+    Warns
+    -----
+    WindWarning
+        Further than ``APART``.
+    """
+    if not (np.abs(stated) <= 1).all():
+        i = int(np.argmax(np.abs(stated)))
+        raise DataError(f"the table's correlation of the two winds at {altitude[i]:g} m is {stated[i]:g}, beyond 1")
+    inside = (altitude >= filters.joint.altitude[0]) & (altitude <= filters.joint.altitude[-1])
+    h, stated = altitude[inside], stated[inside]
+    own = wind_correlation(filters.joint, filters.zonal.order, h)
+    i = int(np.argmax(np.abs(own - stated)))
+    why = (
+        f"the filters' winds have a correlation of {own[i]:.3g} at {h[i]:g} m, the table says {stated[i]:.3g}; "
+        "'ascentwind wind apply --components both' writes both of one wind"
+    )
+    if abs(own[i] - stated[i]) > LARGEST_APART:
+        raise DataError(why)
+    if abs(own[i] - stated[i]) > APART:
+        warnings.warn(WindWarning(why), stacklevel=3)
 
 
 def check_wind(wind: WindModel, flight: LoadedFlight) -> None:

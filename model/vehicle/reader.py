@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+import tomllib
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,18 +16,21 @@ from ..deprecation import warn_deprecated
 from ..errors import DataError, DataErrorCollector, PlausibilityWarning, WindWarning, suggestion
 from ..files.csv_table import CsvTable, read_csv_table
 from ..files.folder_files import file_inside
+from ..files.text_file import read_text
 from ..system.switches import switch_times
 from ..tables import Table
-from ..wind.filter_file import read_filter
+from ..wind.filter_file import read_filter, read_two_component_filter
 from ..wind.range_reference import check_against_edition
-from ..wind.record import WindOrigin, WindRecord
+from ..wind.record import COMPONENTS, WindOrigin, WindRecord
 from ..wind.shaping_filter import TwoPartKernel
 from ..wind.statistics import WindModel, check_plausible, closed_form_filter, report_standard_deviation
 from ..wind.turbulence import INTENSITY, Turbulence, turbulence_intensity
+from ..wind.two_components import TwoComponentWind
 from .columns import (
     AERODYNAMICS,
     ALTITUDE,
     AXIAL,
+    AZIMUTH_CHANGE,
     GAINS,
     MOVED_MODE,
     PREFIX,
@@ -37,21 +42,34 @@ from .columns import (
     TRAJECTORY,
     TURBULENCE,
     WIND,
+    WIND_COMPONENTS,
+    ZERO_ANGLE,
     Column,
     bending_columns,
     local_columns,
     mode_columns,
 )
-from .coverage import check_intensity, check_schedule, check_wind, loaded_flight
+from .coverage import check_intensity, check_joint_correlation, check_schedule, check_winds, loaded_flight
 from .loads import AXIAL_FORCE, lateral_loads, load_name
 from .names import name_faults
 from .noise_loads import check_noises, form_is_open, form_of_tables, needed_columns, needed_for
+from .planes import BOTH, SECTIONS, flown_planes, own_tables, plane_entry, plane_file, plane_names
 from .plausibility import check_plausibility
 from .shipped import VEHICLE_FILE
 from .vehicle import TableSource, Vehicle
-from .vehicle_file import TableEntry, TurbulenceEntry, VehicleFile, WindEntry, WindRecordEntry, read_vehicle_file
+from .vehicle_file import (
+    PlaneTablesEntry,
+    TableEntry,
+    TurbulenceEntry,
+    VehicleFile,
+    WindEntry,
+    WindRecordEntry,
+    read_vehicle_file,
+)
 
 REGULAR = 1.5  # times the usual step: in a table whose other steps are shorter, rows were lost at a longer one
+CONSTRUCTION_FILE = "construction.toml"
+SAME_AZIMUTH = 1e-6  # deg
 FORMER_Q_ALPHA = "dynamic_pressure_times_angle_of_attack"
 
 
@@ -88,46 +106,26 @@ def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehi
     if FORMER_Q_ALPHA in file.options.extra_outputs:
         warn_deprecated(f"the extra output {FORMER_Q_ALPHA}", "q_alpha, which every vehicle has")
     reader = _Reader(folder, toml, file)
+    if file.planes != "yaw" and file.options.mean_response == "nonlinear":
+        why = f'is of the yaw plane, and planes = "{file.planes}"; set it to "linear"'
+        reader.collector.errors.append(DataError(why, file=toml, column="options.mean_response"))
     reader.collector.errors += [DataError(why, file=toml, column=key) for key, why in name_faults(file)]
-    for name, columns in (
-        ("rigid_body", RIGID_BODY),
-        ("trajectory", TRAJECTORY),
-        ("propulsion", PROPULSION),
-        ("aerodynamics", AERODYNAMICS),
-    ):
-        reader.add(name, getattr(file.tables, name), columns)
-    reader.add("control.gains", file.control.gains, GAINS, "control.")
-    _add_load_relief(reader, file)
-    tanks = [tank.name for tank in file.slosh]
     file = _with_noise_loads(file, folder, toml)
-    of_loads, of_modes = needed_columns(file)
-    for i, mode in enumerate(file.bending, start=1):
-        reader.add(f"bending.{i}", mode.table, (*bending_columns(tanks), *of_modes), f"bending.{i}.", (MOVED_MODE,))
-    for tank in file.slosh:
-        reader.add(f"slosh.{tank.name}", tank.table, SLOSH, f"slosh.{tank.name}.")
-    modes = len(file.bending)
-    for load in lateral_loads(file):
-        by_need, needed = load.by_need(modes), {column.name for column in of_loads}
-        columns = dict.fromkeys((*load.columns(modes, tanks), *(c for c in by_need if c.name in needed)))
-        if file.options.slosh_reaction:
-            if load.station.forward_of_gimbal_m is None:
-                raise DataError(
-                    "is missing, but options.slosh_reaction needs it; give metres forward of the gimbal plane",
-                    file=toml,
-                    column=f"loads.{load.output}.forward_of_gimbal_m",
-                )
-            columns |= dict.fromkeys(load.reaction)
-        unused = (*by_need, *(load.local_columns(modes) if load.is_shear else ()))
-        reader.add(f"loads.{load.output}", load.table, tuple(columns), f"loads.{load.output}.", unused)
-    for entry in file.loads:
-        if entry.axial:
-            output = load_name(entry.output, AXIAL_FORCE)
-            reader.add(f"loads.{output}", entry.axial, AXIAL, f"loads.{output}.")
-    if file.options.local_angle_of_attack:
-        _add_local(reader, file)
+    names = plane_names(file)
+    turns = (AZIMUTH_CHANGE,)
+    reader.add("rigid_body", file.tables.rigid_body, RIGID_BODY)
+    reader.add("trajectory", file.tables.trajectory, TRAJECTORY, "", turns, turns if len(names) > 1 else ())
+    reader.add("propulsion", file.tables.propulsion, PROPULSION)
+    if len(names) == 1:
+        _add_tables(reader, plane_file(file, names[0]))
+        _add_moment_of_inertia(reader, file, names[0], "")
+    else:
+        _add_tables(reader, file)
+        for name in names:
+            _add_plane(reader, file, name)
     wind = turbulence = None
     with reader.collector.part():
-        wind = _load_wind(folder, file.wind, reader)
+        wind = _load_both(file.wind, reader) if file.planes == BOTH else _load_wind(file, reader)
         turbulence = _load_turbulence(file.wind.turbulence, wind, reader)
     reader.collector.raise_all()
     for name, noise in file.noise.items():
@@ -137,7 +135,7 @@ def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehi
                 reader.collector.errors.append(DataError(why, file=toml, column=f"noise.{name}"))
     reader.collector.raise_all()
     assert wind is not None  # its error was raised
-    timed = [s for s in reader.sources if not s.name.startswith(("wind", "control."))]
+    timed = [s for s in reader.sources if not s.name.startswith("wind") and "control." not in s.name]
     first, last = max(timed, key=lambda s: s.first), min(timed, key=lambda s: s.last)
     start = file.start_time_s
     if start < first.first:
@@ -166,9 +164,76 @@ def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehi
         sources=tuple(reader.sources),
         turbulence=turbulence,
     )
-    check_plausibility(vehicle)
+    for plane in flown_planes(vehicle):
+        check_plausibility(plane.vehicle)
     _check_coverage(reader, wind, turbulence, start, last.last)
     return vehicle
+
+
+EVERYTHING = frozenset((*SECTIONS, *PlaneTablesEntry.model_fields))
+
+
+def _add_tables(reader: _Reader, file: VehicleFile, scope: str = "", wanted: frozenset[str] = EVERYTHING) -> None:
+    """Read the tables of a plane of which a vehicle may have two: all, or those of some sections alone."""
+    if "aerodynamics" in wanted:
+        reader.add(f"{scope}aerodynamics", file.tables.aerodynamics, AERODYNAMICS, scope, (), (ZERO_ANGLE,))
+    if "control" in wanted:
+        reader.add(f"{scope}control.gains", file.control.gains, GAINS, f"{scope}control.")
+        _add_load_relief(reader, file, scope)
+    tanks, modes = [tank.name for tank in file.slosh], len(file.bending)
+    of_loads, of_modes = needed_columns(file)
+    for i, mode in enumerate(file.bending if "bending" in wanted else (), start=1):
+        name = f"{scope}bending.{i}"
+        reader.add(name, mode.table, (*bending_columns(tanks), *of_modes), f"{name}.", (MOVED_MODE,))
+    for tank in file.slosh if "slosh" in wanted else ():
+        reader.add(f"{scope}slosh.{tank.name}", tank.table, SLOSH, f"{scope}slosh.{tank.name}.")
+    for load in lateral_loads(file) if "loads" in wanted else ():
+        by_need, needed = load.by_need(modes), {column.name for column in of_loads}
+        columns = dict.fromkeys((*load.columns(modes, tanks), *(c for c in by_need if c.name in needed)))
+        if file.options.slosh_reaction:
+            if load.station.forward_of_gimbal_m is None:
+                raise DataError(
+                    "is missing, but options.slosh_reaction needs it; give metres forward of the gimbal plane",
+                    file=reader.toml,
+                    column=f"{scope}loads.{load.output}.forward_of_gimbal_m",
+                )
+            columns |= dict.fromkeys(load.reaction)
+        unused = (*by_need, *(load.local_columns(modes) if load.is_shear else ()))
+        name = f"{scope}loads.{load.output}"
+        reader.add(name, load.table, tuple(columns), f"{name}.", unused)
+    for entry in file.loads if "loads" in wanted else ():
+        if entry.axial:
+            name = f"{scope}loads.{load_name(entry.output, AXIAL_FORCE)}"
+            reader.add(name, entry.axial, AXIAL, f"{name}.")
+    if file.options.local_angle_of_attack:
+        _add_local(reader, file, scope, wanted)
+
+
+def _add_plane(reader: _Reader, file: VehicleFile, plane: str) -> None:
+    """Read what one of two planes has for itself."""
+    entry, own = plane_entry(file, plane), plane_file(file, plane)
+    stated = {section for section in SECTIONS if getattr(entry, section) is not None}
+    tanks = [[tank.name for tank in f.slosh] for f in (file, own)]
+    for needs, differs, what in (
+        ("bending", tanks[0] != tanks[1], "other slosh tanks"),
+        ("loads", tanks[0] != tanks[1], "other slosh tanks"),
+        ("loads", len(file.bending) != len(own.bending), "another number of bending modes"),
+    ):
+        if differs and needs not in stated and getattr(file, needs):
+            raise DataError(
+                f"is missing, but this plane has {what}, and {needs} have columns for each; give its own",
+                file=reader.toml,
+                column=f"{plane}.{needs}",
+            )
+    _add_tables(reader, own, f"{plane}.", frozenset((*stated, *own_tables(entry))))
+    _add_moment_of_inertia(reader, file, plane, f"{plane}.")
+
+
+def _add_moment_of_inertia(reader: _Reader, file: VehicleFile, plane: str, scope: str) -> None:
+    table = plane_entry(file, plane).tables.moment_of_inertia
+    if table is not None:
+        column = next(column for column in RIGID_BODY if column.name == "moment_of_inertia")
+        reader.add(f"{plane}.moment_of_inertia", table, (column,), scope)
 
 
 def _with_noise_loads(file: VehicleFile, folder: Path, toml: Path) -> VehicleFile:
@@ -199,14 +264,14 @@ def _refuse_unused(changes: Mapping[str, Any], file: VehicleFile, toml: Path) ->
                 raise DataError(f"changes nothing here; it is used with {why}", file=toml, column=key)
 
 
-def _add_load_relief(reader: _Reader, file: VehicleFile) -> None:
+def _add_load_relief(reader: _Reader, file: VehicleFile, scope: str) -> None:
     """Read gain schedules and bending modes of the load-relief sensors."""
     for sensor, entry in file.control.load_relief.items():
-        prefix = f"control.{sensor}."
+        prefix = f"{scope}control.{sensor}."
         if entry.schedule:
             reader.add(f"{prefix}schedule", entry.schedule, SCHEDULE, prefix)
         if entry.modes:
-            reader.add(f"load_relief.{sensor}", entry.modes, mode_columns(len(file.bending)), prefix)
+            reader.add(f"{scope}load_relief.{sensor}", entry.modes, mode_columns(len(file.bending)), prefix)
         elif file.bending:
             columns = ", ".join(column.label for column in mode_columns(len(file.bending)))
             raise DataError(
@@ -214,7 +279,7 @@ def _add_load_relief(reader: _Reader, file: VehicleFile) -> None:
             )
 
 
-def _add_local(reader: _Reader, file: VehicleFile) -> None:
+def _add_local(reader: _Reader, file: VehicleFile, scope: str, wanted: frozenset[str]) -> None:
     """Read the integrals that the option local_angle_of_attack needs."""
     modes, missing = (
         len(file.bending),
@@ -222,11 +287,13 @@ def _add_local(reader: _Reader, file: VehicleFile) -> None:
     )
     if file.tables.local_aerodynamics is None:
         raise DataError(missing, file=reader.toml, column="tables.local_aerodynamics")
-    reader.add("local_aerodynamics", file.tables.local_aerodynamics, local_columns(modes), PREFIX)
-    for load in lateral_loads(file):
+    if "local_aerodynamics" in wanted:
+        table = file.tables.local_aerodynamics
+        reader.add(f"{scope}local_aerodynamics", table, local_columns(modes), f"{scope}{PREFIX}")
+    for load in lateral_loads(file) if "loads" in wanted else ():
         if load.local is None:
-            raise DataError(missing, file=reader.toml, column=f"loads.{load.output}.local")
-        name = f"{PREFIX}loads.{load.output}"
+            raise DataError(missing, file=reader.toml, column=f"{scope}loads.{load.output}.local")
+        name = f"{scope}{PREFIX}loads.{load.output}"
         rest = (*load.columns(modes, ()), *load.by_need(modes)) if load.is_shear else ()
         reader.add(name, load.local, load.local_columns(modes), f"{name}.", rest)
 
@@ -278,15 +345,26 @@ class _Reader:
         columns: Sequence[Column],
         prefix: str = "",
         unused: Iterable[Column] = (),
+        where_there: Iterable[Column] = (),
     ) -> None:
         """Read a table; what is wrong with it is kept in ``collector``."""
         with self.collector.part():
-            self._add(name, entry, columns, prefix, unused)
+            self._add(name, entry, columns, prefix, unused, tuple(where_there))
 
     def _add(
-        self, name: str, entry: TableEntry, columns: Sequence[Column], prefix: str, unused: Iterable[Column]
+        self,
+        name: str,
+        entry: TableEntry,
+        columns: Sequence[Column],
+        prefix: str,
+        unused: Iterable[Column],
+        where_there: Sequence[Column],
     ) -> None:
-        csv = self.read(name, entry, columns, TIME, unused)
+        csv = self.read(name, entry, columns, TIME, (*unused, *where_there))
+        for column in where_there:
+            if column.name in csv.columns:
+                csv.column(column.name, column.unit)
+                columns = (*columns, column)
         for event in entry.events:
             if event not in self.events:
                 raise DataError(
@@ -307,7 +385,7 @@ class _Reader:
             except DataError as error:
                 raise DataError(error.why, file=csv.file, column=column, time=error.time) from None
             self.tables[table.name] = table
-            if name.startswith("control."):
+            if "control." in name:
                 self.schedules[name] = (table, csv.file)
 
     def _check_between_rows(self, table: Table, sign: str) -> None:
@@ -353,10 +431,83 @@ def _warn_of_gap(csv: CsvTable, fewest: int) -> None:
         )
 
 
-def _load_wind(folder: Path, entry: WindEntry, reader: _Reader) -> WindModel:
+def _load_both(entry: WindEntry, reader: _Reader) -> TwoComponentWind:
+    """Read zonal and meridional wind for both planes."""
+    missing = [
+        DataError(f'is missing, but planes = "both" needs it; {out}', file=reader.toml, column=f"wind.{key}")
+        for key, out, value in (
+            ("azimuth_deg", "give the azimuth of the flight, from north towards east", entry.azimuth_deg),
+            ("components", "'ascentwind wind apply VEHICLE --components both' writes it", entry.components),
+        )
+        if value is None
+    ]
+    reader.collector.errors += missing
+    reader.collector.raise_all()
+    assert entry.azimuth_deg is not None and entry.components is not None
+    _check_azimuth(entry.azimuth_deg, reader)
+    parts, r = entry.components, entry.components.record
+    csv = reader.read("wind", parts.statistics, WIND_COMPONENTS, ALTITUDE)
+    h, record = csv.columns["altitude"], None
+    if r is None:
+        _warn_of_no_record(reader.toml, "--components both")
+    else:
+        origin = WindOrigin(r.site, BOTH, r.period, r.edition)
+        azimuth = math.radians(entry.azimuth_deg)
+        record = WindRecord(origin, azimuth, 1, r.held_above_m, r.source, r.independent_samples)
+    file = file_inside(reader.folder, parts.filter)
+    filters = read_two_component_filter(file)
+    low, high = (float(x) for x in filters.joint.altitude[[0, -1]])
+    reader.sources.append(TableSource("wind.filter", file, "computed", filters.joint.source, low, high))
+    winds, interpolation = [], parts.statistics.interpolation
+    for component, shaping_filter in zip(COMPONENTS, (filters.zonal, filters.meridional), strict=True):
+        mean, sigma = (csv.columns[f"{name}_{component}"] for name in ("mean", "standard_deviation"))
+        try:
+            check_plausible(f"the {component} wind's statistics", h, mean, sigma)
+            if record is not None:
+                one = replace(record, origin=replace(record.origin, component=component), azimuth=math.pi / 4)
+                check_against_edition(one, h, mean, sigma)
+        except DataError as error:
+            raise DataError(error.why, file=csv.file) from None
+        winds.append(
+            WindModel(
+                Table(f"wind.mean_{component}", "m/s", h, mean, interpolation),
+                shaping_filter,
+                Table(f"wind.standard_deviation_{component}", "m/s", h, sigma, interpolation),
+            )
+        )
+    try:
+        check_joint_correlation(filters, h, csv.columns["correlation"])
+        return TwoComponentWind(winds[0], winds[1], filters, record)
+    except DataError as error:
+        raise DataError(error.why, file=file) from None
+
+
+def _check_azimuth(azimuth_deg: float, reader: _Reader) -> None:
+    """Hold the azimuth against that of the construction, where the folder has one."""
+    file = reader.folder / CONSTRUCTION_FILE
+    built = tomllib.loads(read_text(file)).get("site", {}).get("azimuth_deg") if file.is_file() else None
+    if isinstance(built, int | float) and abs(built - azimuth_deg) > SAME_AZIMUTH:
+        raise DataError(
+            f"is {azimuth_deg:g}, but {CONSTRUCTION_FILE} was built for site.azimuth_deg = {built:g}; give that, or "
+            "build the vehicle for the other one. The parameter 'wind.azimuth' turns the wind without a new flight",
+            file=reader.toml,
+            column="wind.azimuth_deg",
+        )
+
+
+def _load_wind(vehicle: VehicleFile, reader: _Reader) -> WindModel:
+    folder, entry = reader.folder, vehicle.wind
     csv = reader.read("wind", entry.statistics, WIND, ALTITUDE)
     h, mean, sigma = (csv.columns[name] for name in ("altitude", "mean", "standard_deviation"))
-    record = _wind_record(entry.record, reader.toml)
+    record = _wind_record(entry.record, vehicle.planes, reader.toml)
+    if entry.azimuth_deg is not None and record is not None:
+        stated = math.degrees(record.azimuth)
+        if abs(stated - entry.azimuth_deg) > SAME_AZIMUTH:
+            raise DataError(
+                f"is {entry.azimuth_deg:g}, but wind.record.azimuth_deg is {stated:g}; correct one of them",
+                file=reader.toml,
+                column="wind.azimuth_deg",
+            )
     try:
         check_plausible("the wind's statistics", h, mean, sigma)
         if record is not None:
@@ -391,10 +542,18 @@ def _load_wind(folder: Path, entry: WindEntry, reader: _Reader) -> WindModel:
         raise DataError(error.why, file=file) from None
 
 
-def _load_turbulence(entry: TurbulenceEntry | None, wind: WindModel, reader: _Reader) -> Turbulence | None:
+def _load_turbulence(
+    entry: TurbulenceEntry | None, wind: WindModel | TwoComponentWind, reader: _Reader
+) -> Turbulence | None:
     """Return a vehicle's turbulence, None where it is off."""
     if entry is None or entry.severity == "off":
         return None
+    if entry.correlation is not None and not isinstance(wind, WindModel):
+        raise DataError(
+            'is of one wind, and planes = "both" has two components; leave it out: turbulence is then independent',
+            file=reader.toml,
+            column="wind.turbulence.correlation",
+        )
     if entry.intensity is None:
         assert entry.severity is not None  # checked by TurbulenceEntry
         intensity, file = turbulence_intensity(entry.severity), reader.toml
@@ -403,7 +562,7 @@ def _load_turbulence(entry: TurbulenceEntry | None, wind: WindModel, reader: _Re
         altitude, sigma, file = csv.columns["altitude"], csv.columns["sigma"], csv.file
         intensity = Table(INTENSITY, "m/s", altitude, sigma, entry.intensity.interpolation)
     high_pass, length = None if entry.high_pass_m == "none" else entry.high_pass_m, entry.length_m
-    low, high = (float(x) for x in wind.mean.argument[[0, -1]])
+    low, high = (float(x) for x in wind.means[0].argument[[0, -1]])
     if high_pass is not None and high_pass > high - low:
         raise DataError(
             f"is {high_pass:g} m, more than the {high - low:g} m that the wind's statistics cover: no wave of theirs "
@@ -417,15 +576,19 @@ def _load_turbulence(entry: TurbulenceEntry | None, wind: WindModel, reader: _Re
         raise DataError(error.why, file=file, column="wind.turbulence") from None
 
 
-def _wind_record(entry: WindRecordEntry | None, toml: Path) -> WindRecord | None:
+def _warn_of_no_record(toml: Path, option: str) -> None:
+    warnings.warn(
+        WindWarning(
+            f"{toml} holds no record of its wind: nobody can tell whether mean and filter are of one wind; 'ascentwind "
+            f"wind apply VEHICLE {option}' writes filter, mean and record together"
+        ),
+        stacklevel=5,
+    )
+
+
+def _wind_record(entry: WindRecordEntry | None, plane: str, toml: Path) -> WindRecord | None:
     if entry is None:
-        warnings.warn(
-            WindWarning(
-                f"{toml} holds no [wind.record]: nobody can tell whether mean and filter are of one wind; 'ascentwind "
-                "wind apply VEHICLE --component zonal|meridional' writes filter, mean and record together"
-            ),
-            stacklevel=4,
-        )
+        _warn_of_no_record(toml, "--component zonal|meridional")
         return None
     origin = WindOrigin(entry.site, entry.component, entry.period, entry.edition)
     try:
@@ -436,18 +599,21 @@ def _wind_record(entry: WindRecordEntry | None, toml: Path) -> WindRecord | None
             entry.held_above_m,
             entry.source,
             entry.independent_samples,
+            plane,
         )
     except DataError as error:
         raise DataError(error.why, file=toml, column="wind.record") from None
 
 
-def _check_coverage(reader: _Reader, wind: WindModel, turbulence: Turbulence | None, start: float, end: float) -> None:
+def _check_coverage(
+    reader: _Reader, wind: WindModel | TwoComponentWind, turbulence: Turbulence | None, start: float, end: float
+) -> None:
     """Hold schedules of the control system and the wind against the part of the flight that they must cover."""
     flight = loaded_flight(reader.tables, start, end)
     for name, (table, file) in reader.schedules.items():
         check_schedule(name, table, flight, file)
     try:
-        check_wind(wind, flight)
+        check_winds(wind, flight)
     except DataError as error:
         raise DataError(error.why, file=reader.toml, column="wind") from None
     entry = reader.file.wind.turbulence

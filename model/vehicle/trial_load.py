@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from ..errors import AscentwindWarning, DataError
 from .reader import load_vehicle
 
 
-def load_trial(made: Path, folder: Path) -> None:
+def load_trial(made: Path, folder: Path, changes: Mapping[str, Any] | None = None) -> None:
     """Load a vehicle as made; its errors and warnings name the files of the folder that it is for.
 
     Raises
@@ -23,7 +25,7 @@ def load_trial(made: Path, folder: Path) -> None:
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
         try:
-            load_vehicle(made)
+            load_vehicle(made, changes)
         except DataError as error:
             file = None if error.file is None else folder / Path(error.file).relative_to(made)
             raise DataError(error.why, file=file, column=error.column, row=error.row, time=error.time) from None

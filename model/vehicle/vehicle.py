@@ -8,6 +8,7 @@ from pathlib import Path
 from ..tables import Table
 from ..wind.statistics import WindModel
 from ..wind.turbulence import Turbulence
+from ..wind.two_components import TwoComponentWind
 from .vehicle_file import (
     BendingEntry,
     NoiseEntry,
@@ -41,7 +42,8 @@ class Vehicle:
         The TOML file as read.
     tables : dict of str to Table
         Quantities over flight time by their full name, such as 'bending.1.frequency'.
-    wind : WindModel
+    wind : WindModel or TwoComponentWind
+        The second of a vehicle that flies in both planes.
     start, end : float
         Flight times covered, s.
     discontinuities : tuple of float
@@ -57,7 +59,7 @@ class Vehicle:
     folder: Path
     file: VehicleFile
     tables: dict[str, Table]
-    wind: WindModel
+    wind: WindModel | TwoComponentWind
     start: float
     end: float
     discontinuities: tuple[float, ...]

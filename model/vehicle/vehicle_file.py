@@ -15,6 +15,7 @@ from ..wind.turbulence import HIGH_PASS, LENGTH
 ExtraOutput = Literal["lateral_drift", "drift_rate", "dynamic_pressure_times_angle_of_attack", "load_components"]
 STRUCTURE = "structure"  # marks keys that change the equations, not numbers in them
 NoiseLoads = Literal["moved_line", "couple_forward", "couple_aft", "as_reported"]
+Planes = Literal["yaw", "pitch", "both"]
 
 
 def _with_spread(value: Any) -> Any:
@@ -129,12 +130,16 @@ class LoadEntry(Section):
 
 
 class NoiseEntry(Section):
-    """A relative deviation of the named tables, coloured unless ``white`` is set."""
+    """A relative deviation of the named tables, coloured unless ``white`` is set.
+
+    In both planes it is one deviation, ``common``, or one of its own in ``each``.
+    """
 
     tables: Annotated[tuple[str, ...], STRUCTURE]
     sigma: NotNegative
     correlation_time_s: Positive = 1.0
     white: Annotated[bool, STRUCTURE] = False
+    planes: Annotated[Literal["common", "each"], STRUCTURE] = "common"
     source: str = ""
 
 
@@ -239,9 +244,34 @@ class TurbulenceEntry(Section):
         return self
 
 
-class WindEntry(Section):
-    """``synthesis`` chooses between ``filter``, a file of 'ascentwind wind fit', and [wind.correlation]."""
+class ComponentsRecordEntry(Section):
+    """Of which statistics the two components are; written by 'ascentwind wind apply --components both'."""
 
+    site: str
+    period: str
+    edition: str
+    held_above_m: float
+    source: str
+    independent_samples: Annotated[float, Field(gt=1)] | None = None
+
+
+class ComponentsEntry(Section):
+    """Zonal and meridional wind together, of a vehicle that flies in both planes."""
+
+    statistics: TableEntry
+    filter: FileName
+    record: ComponentsRecordEntry | None = None
+
+
+class WindEntry(Section):
+    """``synthesis`` chooses between ``filter``, a file of 'ascentwind wind fit', and [wind.correlation].
+
+    In both planes it is ``components``, turned by ``azimuth_deg``, from north towards east.
+    """
+
+    azimuth_deg: Annotated[float, Field(ge=0, le=360)] | None = None
+    pitch_wind: Annotated[Literal["normal", "horizontal"], STRUCTURE] = "normal"
+    components: ComponentsEntry | None = None
     synthesis: Annotated[Literal["fitted", "closed_form"] | None, STRUCTURE] = None
     statistics: TableEntry
     standard_deviation: Literal["table", "cr103010_fit"] = "table"
@@ -296,6 +326,26 @@ class TablesEntry(Section):
     axial_along_vehicle: TableEntry | None = None
 
 
+class PlaneTablesEntry(Section):
+    """Tables of one plane, in the place of the vehicle's; of the moment of inertia the column alone."""
+
+    moment_of_inertia: TableEntry | None = None
+    aerodynamics: TableEntry | None = None
+    local_aerodynamics: TableEntry | None = None
+    loads_along_vehicle: TableEntry | None = None
+    shear_along_vehicle: TableEntry | None = None
+
+
+class PlaneEntry(Section):
+    """What differs in one plane; each takes the place of the vehicle's own section whole."""
+
+    tables: PlaneTablesEntry = PlaneTablesEntry()
+    control: Annotated[ControlEntry | None, STRUCTURE] = None
+    bending: Annotated[tuple[BendingEntry, ...] | None, STRUCTURE] = None
+    slosh: Annotated[tuple[SloshEntry, ...] | None, STRUCTURE] = None
+    loads: Annotated[tuple[LoadEntry, ...] | None, STRUCTURE] = None
+
+
 class VehicleFile(Section):
     """The whole TOML file."""
 
@@ -305,6 +355,9 @@ class VehicleFile(Section):
     start_time_s: float
     default_times: str
     weighting_times_s: tuple[float, ...] = ()
+    planes: Annotated[Planes, STRUCTURE] = "yaw"
+    pitch: PlaneEntry | None = None
+    yaw: PlaneEntry | None = None
     reference_area_m2: Positive
     reference_area_source: str = ""
     events: Annotated[dict[str, float], STRUCTURE] = Field(default_factory=dict)

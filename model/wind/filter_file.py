@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -13,8 +15,10 @@ from numpy.typing import NDArray
 
 from ..errors import DataError
 from ..files.text_file import read_text
-from .record import WindOrigin
+from ..tables import Table
+from .record import COMPONENTS, WindOrigin
 from .shaping_filter import ShapingFilter
+from .two_components import TwoComponentFilter
 
 FORMAT = 1
 KEYS = ("altitude_m", "F_per_m", "G_per_root_m", "H_m_per_s", "start_covariance", "kinks_m")
@@ -32,22 +36,56 @@ def filter_text(shaping_filter: ShapingFilter) -> str:
     return "{\n" + ",\n".join(lines) + "\n}\n"
 
 
+def two_component_filter_text(filters: TwoComponentFilter) -> str:
+    """Return the filters of both components, and what joins them, as JSON; numbers keep all their digits."""
+    r = filters.noise_correlation
+    parts = [
+        f'"{name}": {filter_text(f).rstrip()}'
+        for name, f in zip(COMPONENTS, (filters.zonal, filters.meridional), strict=True)
+    ]
+    joined = json.dumps({"altitude_m": r.argument.tolist(), "value": r.values.tolist()})
+    parts += [f'"noise_correlation": {joined}', f'"start_correlation": {json.dumps(filters.start_correlation)}']
+    return f'{{"format": {FORMAT},\n' + ",\n".join(parts) + "\n}\n"
+
+
 def read_filter(file: Path) -> ShapingFilter:
-    """Read a filter.
+    """Read a filter of one component.
 
     Raises
     ------
     DataError
         The file and what is wrong with it.
     """
-    try:
-        data = json.loads(read_text(file), object_pairs_hook=_each_once, parse_constant=_no_number)
-        if data.get("format") != FORMAT or isinstance(data["format"], bool):
-            raise DataError(f"has format {data.get('format')!r}; this version reads {FORMAT}", file=file)
-        altitude, F, G, H, start, kinks = (_numbers(data[k], k) for k in KEYS)
-        return ShapingFilter(
-            str(data["name"]), altitude, F, G, H, start, tuple(kinks.tolist()), str(data["source"]), _origin(data)
+    with _told(file):
+        return _filter(_data(file))
+
+
+def read_two_component_filter(file: Path) -> TwoComponentFilter:
+    """Read the filters of both components.
+
+    Raises
+    ------
+    DataError
+        The file and what is wrong with it.
+    """
+    with _told(file):
+        data = _data(file)
+        if "zonal" not in data and "F_per_m" in data:
+            raise DataError("holds one component; 'ascentwind wind apply --components both' writes both")
+        zonal, meridional = (_filter(_section(data, name)) for name in COMPONENTS)
+        joined = _section(data, "noise_correlation")
+        altitude, value = (_numbers(joined[key], key) for key in ("altitude_m", "value"))
+        start = _numbers(data["start_correlation"], "start_correlation")
+        return TwoComponentFilter(
+            zonal, meridional, Table("wind.noise_correlation", "1", altitude, value, "linear"), float(start)
         )
+
+
+@contextmanager
+def _told(file: Path) -> Iterator[None]:
+    """Say of which file an error is."""
+    try:
+        yield
     except KeyError as error:
         raise DataError(f"lacks {error}; write filters with 'ascentwind wind fit'", file=file) from None
     except (ValueError, TypeError, AttributeError, IndexError, OverflowError) as error:
@@ -56,6 +94,26 @@ def read_filter(file: Path) -> ShapingFilter:
         raise DataError("nests lists too deep; write filters with 'ascentwind wind fit'", file=file) from None
     except DataError as error:
         raise DataError(error.why, file=file) from None
+
+
+def _data(file: Path) -> dict[str, Any]:
+    data = json.loads(read_text(file), object_pairs_hook=_each_once, parse_constant=_no_number)
+    if data.get("format") != FORMAT or isinstance(data["format"], bool):
+        raise DataError(f"has format {data.get('format')!r}; this version reads {FORMAT}")
+    return data
+
+
+def _section(data: dict[str, Any], key: str) -> dict[str, Any]:
+    if not isinstance(data[key], dict):
+        raise ValueError(f"'{key}' is no section")
+    return data[key]
+
+
+def _filter(data: dict[str, Any]) -> ShapingFilter:
+    altitude, F, G, H, start, kinks = (_numbers(data[k], k) for k in KEYS)
+    return ShapingFilter(
+        str(data["name"]), altitude, F, G, H, start, tuple(kinks.tolist()), str(data["source"]), _origin(data)
+    )
 
 
 def _each_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

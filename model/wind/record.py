@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from ..errors import DataError
 
 COMPONENTS = ("zonal", "meridional")
+BOTH = "both"  # a wind of two components
 SMALLEST_SHARE = 0.05  # of a component's speed across the flight path; below, it blows along the path
 
 
@@ -18,7 +19,7 @@ class WindOrigin:
     Parameters
     ----------
     site : str
-    component : {'zonal', 'meridional'}
+    component : {'zonal', 'meridional', 'both'}
         Positive towards the east, towards the north.
     period : str
         A month, 'annual', or the days of the soundings.
@@ -52,6 +53,8 @@ class WindRecord:
     independent_samples : float, optional
         Soundings behind the statistics, reduced for their correlation from day to day, where that is known: what the
         statistics' own sampling error follows from.
+    plane : {'yaw', 'pitch'}
+        That a single component is taken in.
 
     Raises
     ------
@@ -66,6 +69,7 @@ class WindRecord:
     held_above: float
     source: str
     independent_samples: float | None = None
+    plane: str = "yaw"
 
     def __post_init__(self):
         if self.sign not in (1, -1):
@@ -80,13 +84,17 @@ class WindRecord:
             )
         if self.share_across < SMALLEST_SHARE:
             other = next(c for c in COMPONENTS if c != self.origin.component)
+            along, across = ("along", "across") if self.plane == "yaw" else ("across", "along")
             raise DataError(
-                f"the {self.origin.component} wind blows along a flight path of azimuth "
-                f"{math.degrees(self.azimuth):g} deg, not across it; take the {other} one"
+                f"the {self.origin.component} wind blows {along} a flight path of azimuth "
+                f"{math.degrees(self.azimuth):g} deg, not {across} it; take the {other} one"
             )
 
     @property
     def share_across(self) -> float:
-        """How much of the component's speed is across the flight path, 0 to 1; the whole speed is taken."""
-        across = math.cos if self.origin.component == "zonal" else math.sin
-        return abs(across(self.azimuth))
+        """How much of the component's speed is in the plane that it is taken in, 0 to 1; the whole speed is taken."""
+        if self.origin.component == BOTH:
+            return 1.0
+        eastward = math.cos if self.plane == "yaw" else math.sin
+        northward = math.sin if self.plane == "yaw" else math.cos
+        return abs((eastward if self.origin.component == "zonal" else northward)(self.azimuth))

@@ -58,6 +58,11 @@ class WindModel:
     standard_deviation: Table | None = None
     record: WindRecord | None = None
 
+    @property
+    def means(self) -> tuple[Table, ...]:
+        """The mean alone, as a wind of two components has two."""
+        return (self.mean,)
+
     def __post_init__(self):
         made_for = self.shaping_filter.origin
         if self.record is not None and made_for is not None and made_for != self.record.origin:

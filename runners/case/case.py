@@ -23,8 +23,10 @@ from ...model.errors import (
 )
 from ...model.system.labels import Parameter
 from ...model.system.linear_system import LinearSystem
+from ...model.system.names import WIND
 from ...model.tables import table_values
 from ...model.vehicle.coverage import check_wind, loaded_flight
+from ...model.vehicle.planes import one_wind
 from ...model.vehicle.reader import load_vehicle
 from ...model.vehicle.shipped import find_vehicle
 from ...model.vehicle.vehicle import Vehicle
@@ -220,6 +222,32 @@ class Case:
             raise NoVehicleError(what, self.system.name)
         return self.vehicle
 
+    def wind_input(self, what: str) -> int:
+        """Return which of the known inputs is the one wind that a vehicle meets.
+
+        Parameters
+        ----------
+        what : str
+            The question, which begins the sentence of the error.
+
+        Returns
+        -------
+        int
+
+        Raises
+        ------
+        PlanesError
+            The wind has two components.
+        UnknownNameError
+            The system has no such input.
+        """
+        names = self.system.input_names
+        if WIND in names:
+            return names.index(WIND)
+        if self.vehicle is not None:
+            one_wind(self.vehicle, what)
+        raise UnknownNameError("input", WIND, names)
+
     @property
     def start_altitude(self) -> float:
         """Altitude where the flight starts, m; of a vehicle only, else a NoVehicleError."""
@@ -256,6 +284,7 @@ class Case:
                 f"a wind is a mean and a filter of the same statistics, and {type(wind).__name__} is not: give "
                 "WindModel(statistics.mean_table(), filter)"
             )
+        one_wind(vehicle, "another wind")
         check_wind(wind, loaded_flight(vehicle.tables, vehicle.start, vehicle.end))
         case = self.from_vehicle(replace(vehicle, wind=wind), compile=self.executable.shared_library is not None)
         values = {n: p.value for n, p in self.parameters.items() if n in case.parameters}

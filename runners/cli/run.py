@@ -121,7 +121,7 @@ def run(
         print_levels(loads)
     if along:
         _print_along(along)
-    top = flown.wind.mean.argument[-1]
+    top = min(mean.argument[-1] for mean in flown.wind.means)
     if study.tables(end_times[-1])["altitude"] > top:
         console.print(f"Above {top / 1000:g} km the wind tables end and their last values are held.", style="dim")
     job.end()

@@ -90,7 +90,12 @@ def _statistics_of(
 def apply(
     context: typer.Context,
     vehicle: Annotated[str, typer.Argument(help="Vehicle folder; its vehicle.toml is changed.")],
-    component: Component,
+    component: Annotated[
+        str | None, typer.Option(help="zonal (towards the east) or meridional (towards the north).")
+    ] = None,
+    components: Annotated[
+        str | None, typer.Option(help="'both': zonal and meridional wind together, for planes = \"both\".")
+    ] = None,
     azimuth: Annotated[
         float | None,
         typer.Option(parser=number, help="Of the flight, deg from north towards east; construction.toml's without it."),
@@ -107,6 +112,7 @@ def apply(
     site: Annotated[str | None, typer.Option(help="Of the soundings.")] = None,
 ) -> None:
     """Give a vehicle a wind: filter, mean, standard deviation and record together."""
+    from ...model.errors import UnknownNameError
     from ...model.vehicle.shipped import built_in_vehicles
     from ..solvers.least_squares import FitOptions
     from ..wind.apply import apply_wind, flight_azimuth
@@ -120,6 +126,14 @@ def apply(
     if soundings is not None and site is None:
         raise DataError("soundings do not say where they were taken; give --site")
     across = flight_azimuth(folder, azimuth)
+    if components is not None:
+        refuse_unused(context, ["component", "sign"], "with --components, which are taken as they blow")
+        if components != "both":
+            raise UnknownNameError("choice of components", components, ["both"])
+        _apply_both(context, folder, across, period, edition, soundings, site)
+        return
+    if component is None:
+        raise DataError("it is not said which wind: give --component zonal|meridional, or --components both")
     s = _statistics(context, period, component, edition, TOP, soundings, site)
     where = f"--soundings {soundings.name} --site '{site}'" if soundings else f"--period {period} --edition {edition}"
     command = (
@@ -138,6 +152,48 @@ def apply(
     ):
         if line:
             console.print(line, soft_wrap=True, highlight=False, markup=False)
+
+
+def _apply_both(
+    context: typer.Context,
+    folder: Path,
+    azimuth: float,
+    period: str,
+    edition: str,
+    soundings: Path | None,
+    site: str | None,
+) -> None:
+    from ..solvers.least_squares import FitOptions
+    from ..wind.apply import apply_components
+    from ..wind.fitting.progress import fit_progress
+
+    s = _two_components(context, period, edition, soundings, site)
+    where = f"--soundings {soundings.name} --site '{site}'" if soundings else f"--period {period} --edition {edition}"
+    command = f"ascentwind wind apply --components both --azimuth {math.degrees(azimuth):.9g} {where}"
+    with fit_progress(console, "filters of both components", FitOptions().time_limit) as progress:
+        applied = apply_components(folder, s, azimuth, command, FitOptions(progress=progress))
+    zonal, meridional = (fit.rms_error for fit in applied.fits)
+    for line in (
+        f"filters within {zonal:.3g} (zonal) and {meridional:.3g} m²/s² rms (meridional), the correlation of the two "
+        f"winds at equal levels within {applied.correlation_error:.3g}",
+        f"{', '.join(path.name for path in applied.files)} written in {folder}",
+        'used with planes = "both" in vehicle.toml, or --set planes=both',
+    ):
+        console.print(line, soft_wrap=True, highlight=False, markup=False)
+
+
+def _two_components(context: typer.Context, period: str, edition: str, soundings: Path | None, site: str | None):
+    from ...model.wind.range_reference import shipped_two_components
+    from ...model.wind.soundings import read_soundings
+
+    if soundings is None:
+        refuse_unused(context, ["site"], "without --soundings: the shipped tables are of Cape Canaveral")
+        return shipped_two_components(period, edition=edition, top=TOP)
+    refuse_unused(context, ["period", "edition"], "with --soundings, whose days the statistics are of")
+    read = read_soundings(soundings, drop_incomplete=True)
+    if read.dropped:
+        console.print(f"{read.dropped} incomplete profiles left out", style="dim")
+    return read.statistics(soundings.stem, site)
 
 
 @wind.command()

@@ -15,6 +15,7 @@ from ...codegen.system.evaluation import MatrixEvaluator
 from ...model.equations.noise import DEVIATION
 from ...model.errors import DataError, ParameterValueError, TimeRangeError
 from ...model.system.names import TURBULENCE, WIND
+from ...model.vehicle.planes import one_wind
 from ...model.wind.turbulence import INTENSITY
 from ..case.case import Case
 from ..case.chain import chain_at
@@ -281,7 +282,7 @@ def _sigmas(source: str) -> tuple[str, str]:
 
 def mean_wind(case: Case, altitude: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the mean wind (m/s) that a case's vehicle meets at altitudes (m)."""
-    table = case.vehicle_for("a mean wind").wind.mean
+    table = one_wind(case.vehicle_for("a mean wind"), "a mean wind").mean
     held = np.clip(altitude, table.argument[0], table.argument[-1])
     return case.parameters["wind.mean_scale"].value * table.polynomial(held)
 
@@ -296,6 +297,7 @@ def design_wind(
         raise TimeRangeError("a design wind is of one time: give it in seconds, or the load of a flight")
     if isinstance(sigmas, bool) or not isinstance(sigmas, int | float) or not math.isfinite(sigmas):
         raise ParameterValueError(f"a load of {sigmas!r} sigmas is none; give a number, negative for the other side")
+    one_wind(case.vehicle_for("a design wind"), "a design wind")
     climb = Climb.of(case)
     turbulence = case.vehicle_for("a design wind").turbulence
     if turbulence is not None and turbulence.correlation is not None:
@@ -312,13 +314,13 @@ def design_wind(
     row = system.output_index(name)
     here = interval_before(executable, node)
     C, G, inputs = MatrixEvaluator(executable, ("C", "G", "inputs"))(node, here.low, here.high)
-    wind = system.input_names.index(WIND)
+    wind = case.wind_input("a design wind")
     mean = float(C[row] @ case.mean_states(np.array([node]))[0] + G[row] @ inputs[:, 0])
     (weights,) = weights_of_rows(case, [end], [(C[[row]], G[[row], wind])], node - system.start)
     variance = response_statistics(case, [end], responses=[name]).variance
     other = sum(float(variance.sel(source=s).squeeze()) for s in system.sources if s != WIND)
     vehicle = case.vehicle_for("a design wind")
-    top = float(vehicle.wind.mean.argument[-1])
+    top = float(one_wind(vehicle, "a design wind").mean.argument[-1])
     points = wind_at_points(case, climb, weights, top)
     if not points.variance > 0:
         raise NoVarianceError(f"the wind does not reach '{name}' at {end:g} s: no wind makes that load")

@@ -163,7 +163,7 @@ def wind_at_points(case: Case, climb: Climb, weights: WindWeights, top: float) -
     last = float(climb.altitude(weights.time))
     flown = climb.altitude(_graded(weights))
     bottom, top = min(float(shaping_filter.altitude[0]), start), max(top, last + NEAR)
-    between = [*shaping_filter.kinks, *vehicle.wind.mean.argument]
+    between = [*shaping_filter.kinks, *(h for mean in vehicle.wind.means for h in mean.argument)]
     marks = [h for h in between if bottom < h < top]
     edges = [bottom, *_spread(bottom, start, FAR), *flown, last]
     edges += [last + DENSE * k for k in range(1, round(NEAR / DENSE) + 1)]

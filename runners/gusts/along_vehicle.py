@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from ...model.system.names import WIND
 from ...model.vehicle.loads import BENDING_MOMENT
 from ..case.provenance import provenance
 from ..station_loads.loads_along_vehicle import load_rows
@@ -41,7 +40,7 @@ def gust_along_vehicle(
     """
     case, climb = sweep.case, sweep.climb
     rows = load_rows(case, [worst.time], load=load, slosh_reaction=slosh_reaction)
-    wind = case.system.input_names.index(WIND)
+    wind = case.wind_input("a gust")
     reach = max(worst.time - worst.time_met, sweep.longest + AFTER)
     weights = weights_of_rows(case, [worst.time], [(rows.state[0], rows.direct[0, :, wind])], reach)[0]
     own = gust_products(weights, climb, worst.gust, np.array([worst.start_altitude]))[0]

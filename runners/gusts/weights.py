@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from scipy.interpolate import BSpline, make_interp_spline
 
 from ...codegen.system.evaluation import MatrixEvaluator
-from ...model.system.names import WIND
 from ..case.case import Case
 from ..solvers.discretisation import exact_transitions
 from ..solvers.time_nodes import Interval, interval_before, intervals, time_nodes
@@ -95,7 +94,7 @@ def wind_weights(
 def _weights_of_outputs(
     case: Case, times: Sequence[float], rows: list[int], reach: float, spacing: float | None
 ) -> list[WindWeights]:
-    executable, wind = case.with_means, case.system.input_names.index(WIND)
+    executable, wind = case.with_means, case.wind_input("a gust")
     evaluate = MatrixEvaluator(executable, ("C", "G"))
     ends = []
     for node in time_nodes(executable, times):
@@ -161,7 +160,7 @@ class WeightGrid:
     @classmethod
     def of(cls, case: Case, begin: float, nodes: NDArray[np.float64], spacing: float) -> WeightGrid:
         """Return points at most ``spacing`` (s) apart from ``begin`` (s) on, the nodes (s) among them."""
-        executable, wind = case.with_means, case.system.input_names.index(WIND)
+        executable, wind = case.with_means, case.wind_input("a gust")
         pieces = tuple(intervals(executable, begin, float(nodes[-1]))) if nodes[-1] > begin else ()
         marks = np.unique([begin, *nodes.tolist(), *(piece.end for piece in pieces)])
         parts = []

@@ -16,10 +16,12 @@ import xarray as xr
 
 from ...codegen.system.executable import ExecutableSystem
 from ...model.equations.vehicle_tables import vehicle_tables
-from ...model.errors import ParameterValueError
+from ...model.errors import ParameterValueError, PlanesError
 from ...model.system.names import COMBINED, WIND
+from ...model.tables import Table
 from ...model.vehicle.vehicle import Vehicle
 from ...model.wind.shaping_filter import ShapingFilter
+from ...model.wind.two_components import TwoComponentWind
 from ..case.wind_start import covariance_at
 from ..solvers.adjoint import AdjointSolver
 from ..solvers.integration import CvodesSettings
@@ -188,9 +190,19 @@ def _with_row(vehicle: Vehicle, name: str, row: int, value: float) -> Vehicle:
     changed = replace(table, values=values)
     if name in vehicle.tables:
         return replace(vehicle, tables=vehicle.tables | {name: changed})
+    if isinstance(vehicle.wind, TwoComponentWind):
+        return replace(vehicle, wind=_with_component(vehicle.wind, changed))
     if name == "wind.mean":
         return replace(vehicle, wind=replace(vehicle.wind, mean=changed))
     return replace(vehicle, wind=replace(vehicle.wind, shaping_filter=_with_entry(vehicle, changed.name, values)))
+
+
+def _with_component(wind: TwoComponentWind, changed: Table) -> TwoComponentWind:
+    """Return a wind with another mean of one component."""
+    for component, part in wind.components.items():
+        if part.mean.name == changed.name:
+            return replace(wind, **{component: replace(part, mean=changed)})
+    raise PlanesError(f"a difference by a row of '{changed.name}'", "the vehicle")
 
 
 def _with_entry(vehicle: Vehicle, name: str, values: np.ndarray) -> ShapingFilter:

@@ -34,7 +34,7 @@ PCHIP_STEP = 1e-5  # of a table's largest value
 def vehicle_rows(vehicle: Vehicle) -> dict[str, Table]:
     """Return the tables of a vehicle with rows of their own: over time, of the mean wind and of its filter."""
     wind = vehicle.wind
-    return {t.name: t for t in (*vehicle.tables.values(), wind.mean, *wind.shaping_filter.tables())}
+    return {t.name: t for t in (*vehicle.tables.values(), *wind.means, *wind.shaping_filter.tables())}
 
 
 def knot_sensitivities(

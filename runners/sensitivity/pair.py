@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...model.equations.vehicle_tables import MEAN_TABLES
+from ...model.equations.vehicle_tables import is_mean, mean_source
 from ..solvers.collocation_grid import STAGES, tables_at
 from ..solvers.flight_nodes import FlightNodes
 from ..solvers.start_functions import start_functions
@@ -171,11 +171,13 @@ class AdjointPair:
         """Give what the variance owes to the tables of the mean response to the mean's states and outputs."""
         system = self.executable.system
         names = [name for g in self.executable.groups for name in g.names]
-        if not set(MEAN_TABLES) <= set(names):
+        means = [name for name in names if is_mean(name)]
+        if not means:
             return None
         k, n, r = self.times.size, len(system.states), len(system.outputs)
         path = MeanPath(np.zeros((k, n)), np.zeros((k, r)), np.zeros(n), np.zeros(r))
-        for name, (kind, what) in MEAN_TABLES.items():
+        for name in means:
+            kind, what = mean_source(name)
             along, last = on_tables[:, names.index(name)], on_tables_end[names.index(name)]
             if kind == "output":
                 row = system.output_index(what)

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ...codegen.nodes.expressions import MATRICES
 from ...codegen.nodes.matrix import NodeMatrix
-from ...model.equations.vehicle_tables import MEAN_TABLES
+from ...model.equations.vehicle_tables import is_mean, mean_source
 from ...model.errors import ParameterValueError, SwitchError
 from ..case.provenance import provenance
 from ..solvers.collocation_grid import STAGES
@@ -189,8 +189,9 @@ def _column(pair: AdjointPair, combined: Combination, factors: tuple[float, floa
     _, outputs = nodes.mean_tangents(d, x, dx)
     _, outputs_end = end.mean_tangents(d_end, x_end, dx_end)
     names = [name for group in pair.executable.groups for name in group.names]
-    for name, (kind, what) in MEAN_TABLES.items():
-        if name in names:
+    for name in names:
+        if is_mean(name):
+            kind, what = mean_source(name)
             at = system.output_index(what) if kind == "output" else system.state_names.index(what)
             d_tables[:, names.index(name)] = (outputs if kind == "output" else dx)[:, at]
             d_end_tables[:, names.index(name)] = (outputs_end if kind == "output" else dx_end)[:, at]

@@ -124,7 +124,7 @@ def _by_kilometre(pair: AdjointPair, total: TotalDensity, names: list[str], over
     variables = {}
     for label, what, chosen in (
         ("wind_sigma_elasticity", "the wind's sigma", [n.startswith(WIND_OUTPUT) for n in names]),
-        ("wind_mean_elasticity", "the mean wind", [n == WIND_MEAN for n in names]),
+        ("wind_mean_elasticity", "the mean wind", [n.startswith(WIND_MEAN) for n in names]),
     ):
         if any(chosen):
             share = pair.weights * np.sum(total.along[:, chosen] * pair.tables[:, chosen], axis=1) / value

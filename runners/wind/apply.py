@@ -8,9 +8,12 @@ import re
 import shutil
 import tempfile
 import tomllib
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from ...model.construction.construction_entries import ConstructionFile
 from ...model.construction.construction_file import CONSTRUCTION_FILE
@@ -19,18 +22,20 @@ from ...model.files.folder_files import unsafe_to_copy
 from ...model.files.toml_file import read_toml
 from ...model.vehicle.reader import VEHICLE_FILE
 from ...model.vehicle.trial_load import load_trial
-from ...model.wind.filter_file import filter_text
+from ...model.wind.filter_file import filter_text, two_component_filter_text
 from ...model.wind.range_reference import EDITIONS
-from ...model.wind.record import WindRecord
-from ...model.wind.statistics import WindStatistics
+from ...model.wind.record import BOTH, COMPONENTS, WindRecord
+from ...model.wind.statistics import TwoComponentStatistics, WindStatistics
+from ...model.wind.two_components import TwoComponentFilter, wind_correlation
 from ..present.files import write_whole
 from ..solvers.least_squares import FitOptions
 from .synthesis.result import SynthesisResult
 from .synthesis.synthesise import synthesise
+from .two_component_fit import fit_noise_correlation
 
 DECIMALS = 3  # of a table of soundings, m/s, and of their number
 AZIMUTH_TOLERANCE = 1e-6  # deg
-KEPT = "turbulence"  # of [wind]: it goes with any wind
+KEPT = ("turbulence", "components")  # of [wind]: turbulence goes with any wind, two components with both planes
 
 _HEADER = re.compile(r"""^\s*\[\[?\s*(?P<name>[A-Za-z0-9_."'-]+)\s*\]\]?\s*(#.*)?$""")
 
@@ -115,38 +120,158 @@ def apply_wind(
         before = toml.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise DataError(f"cannot be read ({error})", file=toml) from None
-    _with_wind(before, _wind_section(record, "", "", command), toml)  # told before a fit of a minute
+    _with_section(
+        before, _wind_section(record, "", "", command, before), ("wind",), toml
+    )  # told before a fit of a minute
     fit = synthesise(statistics, "state-space", 3, options, noises=2)
     made = replace(fit.shaping_filter, source=f"{fit.shaping_filter.source}; written by '{_line(command)}'")
     stem = re.sub(r"[^a-z0-9]+", "_", f"wind {statistics.name}".lower()).strip("_")
     table, coefficients = _table_text(statistics, record, command), filter_text(made)
     table_file = _unused(folder, stem, ".csv", table)
     filter_file = _unused(folder, f"{stem}_filter", ".json", coefficients)
-    after = _with_wind(before, _wind_section(record, table_file.name, filter_file.name, command), toml)
+    after = _with_section(
+        before, _wind_section(record, table_file.name, filter_file.name, command, before), ("wind",), toml
+    )
     texts = {table_file: table, filter_file: coefficients, toml: after}
     _try(folder, {path.name: text for path, text in texts.items()})
-    new = [path for path in texts if not path.exists()]
-    try:
-        for path, text in texts.items():
-            write_whole(path, lambda p, text=text: p.write_text(text, encoding="utf-8"))
-    except BaseException:
-        if toml.read_text(encoding="utf-8") != after:
-            for path in new:
-                path.unlink(missing_ok=True)
-        raise
+    _write(texts, toml)
     earlier = [_named(before, key) for key in ("statistics", "filter")]
     unused = tuple(name for name in earlier if name not in ("", table_file.name, filter_file.name))
     return AppliedWind(record, fit, tuple(texts), unused, str(tomllib.loads(after)["title"]))
 
 
-def _try(folder: Path, texts: dict[str, str]) -> None:
+@dataclass(frozen=True, eq=False)
+class AppliedComponents:
+    """What was put into a vehicle: both filters' errors (m2/s2), their winds' correlation and the files written.
+
+    ``correlation_error``: the largest difference of the winds' correlation from the statistics' at equal levels.
+    """
+
+    record: WindRecord
+    fits: tuple[SynthesisResult, SynthesisResult]
+    correlation_error: float
+    files: tuple[Path, ...]
+
+
+def apply_components(
+    folder: Path, statistics: TwoComponentStatistics, azimuth: float, command: str, options: FitOptions | None = None
+) -> AppliedComponents:
+    """Fit filters of both components and write them with their table and [wind.components] of vehicle.toml.
+
+    The [wind] of one plane stays; its ``azimuth_deg`` is written where there is none. Otherwise as :func:`apply_wind`.
+
+    Parameters
+    ----------
+    folder : Path
+        Holds ``vehicle.toml``.
+    statistics : TwoComponentStatistics
+        With their origins.
+    azimuth : float
+        Of the flight, rad from north towards east.
+    command : str
+        For the comments of the files.
+    options : FitOptions, optional
+
+    Raises
+    ------
+    DataError
+        A wind that does not fit the vehicle, or a vehicle.toml whose [wind.components] cannot be replaced.
+    OutputFolderError
+    """
+    zonal, meridional = statistics.zonal, statistics.meridional
+    assert zonal.origin is not None
+    origin = replace(zonal.origin, component=BOTH)
+    samples = round(min(float(s.independent_samples) for s in (zonal, meridional)), DECIMALS)
+    record = WindRecord(origin, azimuth, 1, float(zonal.altitude[-1]), zonal.source, samples)
+    toml = folder / VEHICLE_FILE
+    try:
+        before = toml.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise DataError(f"cannot be read ({error})", file=toml) from None
+    _with_components(before, record, "", "", command, toml)
+    fits = tuple(synthesise(s, "state-space", 3, options, noises=2) for s in (zonal, meridional))
+    made = [replace(f.shaping_filter, source=f"{f.shaping_filter.source}; by '{_line(command)}'") for f in fits]
+    deviations, wanted = (zonal.standard_deviation, meridional.standard_deviation), statistics.intralevel_correlation
+    r, start = fit_noise_correlation(made[0], made[1], zonal.altitude, wanted, deviations)
+    filters = TwoComponentFilter(made[0], made[1], r, start)
+    own = wind_correlation(filters.joint, filters.zonal.order, zonal.altitude)
+    table, coefficients = _components_table(statistics, record, command), two_component_filter_text(filters)
+    stem = re.sub(r"[^a-z0-9]+", "_", f"wind {origin.period} components".lower()).strip("_")
+    table_file = _unused(folder, stem, ".csv", table)
+    filter_file = _unused(folder, f"{stem}_filter", ".json", coefficients)
+    after = _with_components(before, record, table_file.name, filter_file.name, command, toml)
+    texts = {table_file: table, filter_file: coefficients, toml: after}
+    _try(folder, {path.name: text for path, text in texts.items()}, {"planes": BOTH})
+    _write(texts, toml)
+    return AppliedComponents(record, (fits[0], fits[1]), float(np.abs(own - wanted).max()), tuple(texts))
+
+
+def _with_components(text: str, record: WindRecord, table: str, filter_file: str, command: str, toml: Path) -> str:
+    """Return the text of a vehicle.toml with other [wind.components] and, where there is none, wind.azimuth_deg."""
+    azimuth_deg = round(math.degrees(record.azimuth), 9)
+    stated = (_parsed(text) or {}).get("wind", {}).get("azimuth_deg")
+    if stated is not None and abs(stated - azimuth_deg) > AZIMUTH_TOLERANCE:
+        raise DataError(f"is {stated:g}, but the wind is for {azimuth_deg:g}", file=toml, column="wind.azimuth_deg")
+    if stated is None:
+        text = re.sub(r"(?m)^(\s*\[wind\][^\n]*\n)", rf"\1azimuth_deg = {azimuth_deg}\n", text, count=1)
+    if (_parsed(text) or {}).get("wind", {}).get("azimuth_deg") is None:
+        raise DataError("holds no section [wind] that azimuth_deg could stand in", file=toml, column="wind")
+    origin = record.origin
+    section = _section_text(
+        {
+            "wind.components": {"filter": filter_file},
+            "wind.components.statistics": _statistics_entry(record, table),
+            "wind.components.record": {
+                "site": origin.site,
+                "period": origin.period,
+                "edition": origin.edition,
+                "held_above_m": record.held_above,
+                "source": record.source,
+                "independent_samples": record.independent_samples,
+            },
+        },
+        command,
+    )
+    return _with_section(text, section, ("wind", "components"), toml)
+
+
+def _components_table(statistics: TwoComponentStatistics, record: WindRecord, command: str) -> str:
+    z, m = statistics.zonal, statistics.meridional
+    names = [f"{name}_{component} [m/s]" for component in COMPONENTS for name in ("mean", "standard_deviation")]
+    lines = [
+        f"# {_line(z.source)}",
+        f"# {record.origin.period}, zonal positive towards the east, meridional towards the north",
+        f"# written by '{_line(command)}'",
+        ",".join(["altitude [m]", *names, "correlation [1]"]),
+    ]
+    columns = (z.mean, z.standard_deviation, m.mean, m.standard_deviation)
+    for i, h in enumerate(z.altitude):
+        values = [f"{round(float(column[i]), DECIMALS) + 0.0:g}" for column in columns]
+        lines.append(",".join([f"{h:.10g}", *values, f"{round(float(statistics.intralevel_correlation[i]), 4):g}"]))
+    return "\n".join(lines) + "\n"
+
+
+def _write(texts: dict[Path, str], toml: Path) -> None:
+    """Write files whole, vehicle.toml last; new ones go again if it is not reached."""
+    new = [path for path in texts if not path.exists()]
+    try:
+        for path, text in texts.items():
+            write_whole(path, lambda p, text=text: p.write_text(text, encoding="utf-8"))
+    except BaseException:
+        if toml.read_text(encoding="utf-8") != texts[toml]:
+            for path in new:
+                path.unlink(missing_ok=True)
+        raise
+
+
+def _try(folder: Path, texts: dict[str, str], changes: Mapping[str, Any] | None = None) -> None:
     try:
         with tempfile.TemporaryDirectory() as work:
             made = Path(work) / "vehicle"
             shutil.copytree(folder, made, copy_function=shutil.copyfile, ignore=unsafe_to_copy(folder))
             for name, text in texts.items():
                 (made / name).write_text(text, encoding="utf-8")
-            load_trial(made, folder)
+            load_trial(made, folder, changes)
     except OSError as error:
         raise OutputFolderError(f"{folder} cannot be copied to try its wind ({error.strerror or error})") from None
 
@@ -178,16 +303,14 @@ def _line(text: str) -> str:
     return " ".join(text.split())
 
 
-def _wind_section(record: WindRecord, table: str, filter_file: str, command: str) -> str:
+def _wind_section(record: WindRecord, table: str, filter_file: str, command: str, before: str) -> str:
+    """Return the section of one wind; what turns two components stays as the file before had it."""
+    wind = (_parsed(before) or {}).get("wind", {})
+    kept = {key: wind[key] for key in ("azimuth_deg", "pitch_wind") if isinstance(wind, dict) and key in wind}
     origin = record.origin
-    entries = {
-        "wind": {"filter": filter_file},
-        "wind.statistics": {
-            "file": table,
-            "status": "found" if origin.edition in EDITIONS else "computed",
-            "source": record.source,
-            "interpolation": "pchip",
-        },
+    entries: dict[str, dict[str, Any]] = {
+        "wind": {**kept, "filter": filter_file},
+        "wind.statistics": _statistics_entry(record, table),
         "wind.record": {
             "site": origin.site,
             "component": origin.component,
@@ -200,6 +323,19 @@ def _wind_section(record: WindRecord, table: str, filter_file: str, command: str
             "independent_samples": record.independent_samples,
         },
     }
+    return _section_text(entries, command)
+
+
+def _statistics_entry(record: WindRecord, table: str) -> dict[str, str]:
+    return {
+        "file": table,
+        "status": "found" if record.origin.edition in EDITIONS else "computed",
+        "source": record.source,
+        "interpolation": "pchip",
+    }
+
+
+def _section_text(entries: Mapping[str, Mapping[str, Any]], command: str) -> str:
     lines = []
     for section, values in entries.items():
         lines += [f"[{section}]", *(f"{k} = {json.dumps(v, ensure_ascii=False)}" for k, v in values.items()), ""]
@@ -207,16 +343,16 @@ def _wind_section(record: WindRecord, table: str, filter_file: str, command: str
     return "\n".join(lines)
 
 
-def _with_wind(text: str, section: str, file: Path) -> str:
-    """Return the text of a vehicle.toml with another [wind] and its parts; turbulence and all else stay as they are."""
+def _with_section(text: str, section: str, name: tuple[str, ...], file: Path) -> str:
+    """Return the text of a vehicle.toml with another section of a dotted name and its parts; all else stays."""
     kept: list[str] = []
     dropped: list[str] = []
     place, inside = None, False
     for line in text.splitlines(keepends=True):
         header = _HEADER.match(line)
         if header:
-            keys = [key.strip("\"'") for key in header["name"].split(".")]
-            inside = keys[0] == "wind" and keys[1:2] != [KEPT]
+            parts = tuple(part.strip("\"'") for part in header["name"].split("."))
+            inside = parts[: len(name)] == name and not (len(name) == 1 and parts[1:2] and parts[1] in KEPT)
             if inside:
                 place = len(kept) if place is None else place
                 dropped = []
@@ -228,11 +364,7 @@ def _with_wind(text: str, section: str, file: Path) -> str:
     head, tail = "".join(kept[:place]).rstrip("\n"), "".join(kept[place:])
     changed = f"{head}\n\n{section}\n{tail}" if tail else f"{head}\n\n{section}"
     before = _parsed(text)
-    expected = tomllib.loads(section)
-    wind = (before or {}).get("wind")
-    if isinstance(wind, dict) and KEPT in wind:
-        expected["wind"][KEPT] = wind[KEPT]
-    if before is None or _parsed(changed) != before | expected:
+    if before is None or _parsed(changed) != _replaced(before, tomllib.loads(section), name):
         raise DataError(
             "the wind does not stand in [wind] and [wind.NAME] sections of their own in a valid TOML file; write it "
             "so, then apply again",
@@ -240,6 +372,15 @@ def _with_wind(text: str, section: str, file: Path) -> str:
             column="wind",
         )
     return changed
+
+
+def _replaced(before: dict[str, Any], section: dict[str, Any], name: tuple[str, ...]) -> dict[str, Any]:
+    """Return what a file should hold once a section has taken its place."""
+    if len(name) > 1:
+        return before | {name[0]: _replaced(before[name[0]], section[name[0]], name[1:])}
+    wind = before.get(name[0])
+    kept = {k: wind[k] for k in KEPT if name == ("wind",) and isinstance(wind, dict) and k in wind}
+    return before | {name[0]: section[name[0]] | kept}
 
 
 def _last_comments(lines: list[str]) -> list[str]:

@@ -1,0 +1,154 @@
+"""The equations of a vehicle in one plane: rigid body, control, bending, slosh and outputs, deviations among them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import casadi as ca
+
+from ..system.labels import Output
+from ..vehicle.biases import WIND_BIAS
+from ..vehicle.loads import AXIAL_FORCE, load_name
+from ..vehicle.planes import Plane
+from . import rigid_body
+from .block import Block
+from .control_law import control_law
+from .coupling import Accelerations
+from .deviations import Undeviated, deviated
+from .forces import Handles, solved_motion
+from .motion import Motion
+from .outputs import outputs
+from .typical_sizes import SCALES
+from .vehicle_numbers import Numbers
+from .wind import in_plane
+
+
+@dataclass(frozen=True, eq=False)
+class Winds:
+    """One wind, or its components towards the east and the north.
+
+    Attributes
+    ----------
+    random : tuple of SX
+        Of the filter, m/s.
+    mean : tuple of SX
+        Known inputs, m/s.
+    expected : tuple of SX
+        What these are, m/s.
+    """
+
+    random: tuple[ca.SX, ...]
+    mean: tuple[ca.SX, ...]
+    expected: tuple[ca.SX, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class PlaneEquations:
+    """Equations of one plane.
+
+    Attributes
+    ----------
+    blocks, positions : tuple of Block
+        States and rates; the lateral position apart, which drives nothing.
+    labels : tuple of Output
+    output : SX
+    matrix : SX
+        Of the coupled accelerations, inverted in the equations.
+    """
+
+    blocks: tuple[Block, ...]
+    positions: tuple[Block, ...]
+    labels: tuple[Output, ...]
+    output: ca.SX
+    matrix: ca.SX
+
+
+def plane_equations(plane: Plane, numbers: Numbers, turbulence: ca.SX, winds: Winds) -> PlaneEquations:
+    """Return the equations of a plane; ``turbulence`` (m/s) is across the path in it, beside the wind.
+
+    Raises
+    ------
+    DataError
+        If a noise source deviates a table that the mean response cannot carry.
+    """
+    vehicle = plane.vehicle
+    motion, handles = Motion.of(numbers.modes, numbers.tanks), Handles.new()
+    solved = solved_motion(vehicle, numbers, motion, handles)
+    control = control_law(numbers, motion, solved)
+    met = [random + mean for random, mean in zip(winds.random, winds.mean, strict=True)]
+    if WIND_BIAS in numbers.biases:
+        deviation = numbers.biases[WIND_BIAS].deviation
+        met = [wind + deviation * expected for wind, expected in zip(met, winds.expected, strict=True)]
+    alpha = rigid_body.angle_of_attack(
+        numbers.tables, motion.attitude, motion.lateral_velocity, in_plane(plane, numbers, met) + turbulence
+    )
+    blocks = [
+        *_rigid_body(motion, solved),
+        *control.blocks,
+        *_bending(motion, solved),
+        *_slosh(motion, solved, numbers.tanks),
+    ]
+    positions, moving = _position(plane, motion), len(blocks)
+    blocks += positions
+    responses = outputs(vehicle, numbers, motion, solved, handles)
+    equations = Undeviated(
+        ca.vertcat(*(block.symbols for block in blocks)),
+        rates=ca.vertcat(*(block.rates for block in blocks)),
+        outputs=ca.vertcat(*(value for _, value in responses)),
+        angles=ca.vertcat(alpha, control.engine_angle),
+        responses=tuple(label.name for label, _ in responses),
+        handles=handles,
+    )
+    rates, output = deviated(vehicle, numbers, motion, equations)
+    blocks = _with_rates(blocks, rates, plane.prefix)
+    labels = tuple(_named(plane, label) for label, _ in responses)
+    return PlaneEquations(tuple(blocks[:moving]), tuple(blocks[moving:]), labels, output, solved.matrix)
+
+
+def _with_rates(blocks: Sequence[Block], rates: ca.SX, prefix: str) -> list[Block]:
+    found, first = [], 0
+    for block in blocks:
+        last = first + block.symbols.numel()
+        found.append(Block(block.states, block.symbols, rates[first:last]).named(prefix))
+        first = last
+    return found
+
+
+def _named(plane: Plane, label: Output) -> Output:
+    """Return an output under its name in the system: what lies along the axis belongs to no plane."""
+    along = {load_name(load.output, AXIAL_FORCE) for load in plane.vehicle.file.loads}
+    if not plane.prefix or label.name in along:
+        return label
+    return replace(label, name=plane.prefix + label.name, symbol=f"{label.symbol}, {plane.name}")
+
+
+def _rigid_body(motion: Motion, solved: Accelerations) -> tuple[Block, ...]:
+    return (
+        Block.of("lateral_velocity", motion.lateral_velocity, solved.lateral, "m/s", SCALES["lateral_velocity"]),
+        Block.of("attitude", motion.attitude, motion.attitude_rate, "rad", SCALES["angle"]),
+        Block.of("attitude_rate", motion.attitude_rate, solved.rotation, "rad/s", SCALES["angle"]),
+    )
+
+
+def _bending(motion: Motion, solved: Accelerations) -> tuple[Block, ...]:
+    return (
+        Block.numbered("bending", motion.eta, motion.eta_rate, "m", SCALES["bending"]),
+        Block.numbered("bending_rate", motion.eta_rate, solved.bending, "m/s", SCALES["bending_rate"]),
+    )
+
+
+def _slosh(motion: Motion, solved: Accelerations, tanks: Sequence[str]) -> tuple[Block, ...]:
+    names, rates = ([f"{kind}_{tank}" for tank in tanks] for kind in ("slosh", "slosh_rate"))
+    return (
+        Block.of("slosh", motion.xi, motion.xi_rate, "m", SCALES["slosh"], names),
+        Block.of("slosh_rate", motion.xi_rate, solved.slosh, "m/s", SCALES["slosh_rate"], rates),
+    )
+
+
+def _position(plane: Plane, motion: Motion) -> tuple[Block, ...]:
+    """Return the lateral position, a state where it is an output."""
+    if "lateral_drift" not in plane.vehicle.file.options.extra_outputs:
+        return ()
+    scale = SCALES["lateral_position"]
+    return (Block.of("lateral_position", motion.lateral_position, motion.lateral_velocity, "m", scale),)
