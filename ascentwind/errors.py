@@ -25,6 +25,7 @@ __getattr__, __dir__, __all__ = _lazy.attach(
             "NotPicklableError",
             "OutputFolderError",
             "ParameterValueError",
+            "PlanesError",
             "PlausibilityWarning",
             "SeveralDataErrors",
             "SingularCouplingError",

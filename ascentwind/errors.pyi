@@ -19,6 +19,7 @@ from .model.errors import NotPicklableError as NotPicklableError
 from .model.errors import NoVehicleError as NoVehicleError
 from .model.errors import OutputFolderError as OutputFolderError
 from .model.errors import ParameterValueError as ParameterValueError
+from .model.errors import PlanesError as PlanesError
 from .model.errors import PlausibilityWarning as PlausibilityWarning
 from .model.errors import SeveralDataErrors as SeveralDataErrors
 from .model.errors import SingularCouplingError as SingularCouplingError

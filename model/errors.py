@@ -131,6 +131,13 @@ class PlanesError(AscentwindError):
             'planes = "pitch"'
         )
 
+    @classmethod
+    def of_one(cls, what: str, system: str) -> PlanesError:
+        """Return the error of what needs both planes and is asked of one."""
+        error = cls(what, system)
+        error.args = (f"{what} is of both planes, and '{system}' has one alone; set planes = \"both\"",)
+        return error
+
 
 class DirectNoiseError(AscentwindError):
     """White noise reaches an output directly, so that its variance would be infinite."""

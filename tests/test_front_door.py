@@ -38,6 +38,7 @@ EXAMPLES = {
     "MissingSymPyError": lambda: errors.MissingSymPyError(),
     "NotAParameterError": lambda: errors.NotAParameterError("mass"),
     "NotPositiveSemidefiniteError": lambda: errors.NotPositiveSemidefiniteError("has a negative root", row=2),
+    "PlanesError": lambda: errors.PlanesError("a design wind", "as504"),
     "SeveralDataErrors": lambda: errors.SeveralDataErrors([errors.DataError("is odd", row=3), errors.DataError("too")]),
     "SoundingError": lambda: errors.SoundingError("is odd", file=Path("s.csv"), row=3, sounding="7", altitude=500.0),
     "StepBudgetError": lambda: errors.StepBudgetError(10, "t = 12 s", time=12.0, fastest="-900, slosh 1"),

@@ -69,6 +69,7 @@ from .vehicle_file import (
 
 REGULAR = 1.5  # times the usual step: in a table whose other steps are shorter, rows were lost at a longer one
 CONSTRUCTION_FILE = "construction.toml"
+IN_TITLE = {"yaw": "yaw plane", "pitch": "pitch plane", "both": "both planes"}  # of a title that names the plane
 SAME_AZIMUTH = 1e-6  # deg
 FORMER_Q_ALPHA = "dynamic_pressure_times_angle_of_attack"
 
@@ -153,7 +154,7 @@ def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehi
         )
     vehicle = Vehicle(
         name=file.name,
-        title=file.title,
+        title=file.title.replace("yaw plane", IN_TITLE[file.planes]),
         folder=folder,
         file=file,
         tables=reader.tables,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -17,6 +18,7 @@ from .terminal import Changes, Turbulence, VehicleArgument, number, parse_change
 if TYPE_CHECKING:
     from ..flight_load.load import FlightLoad
     from ..statistics.peak_check import PeakCheck
+    from ..statistics.resultants import Resultants
     from ..statistics.results import ResponseStatistics
     from ..study import Study
     from ..views.along_vehicle_files import LargestAlong
@@ -57,9 +59,11 @@ def run(
     from ..present.style import words, write_figure
     from ..statistics.engines import engine_from
     from ..statistics.larger_side import LABEL
+    from ..statistics.norm import LIKE_3_SIGMA
     from ..statistics.peak_check import weighting_at, with_peak_check
     from ..statistics.percentiles import checked_probabilities
     from ..statistics.response_figures import weighting_figure
+    from ..statistics.resultants import has_resultants
     from ..views.along_vehicle_files import prepare_along_vehicle, write_along_vehicle
 
     chances = checked_probabilities(probability) if probability else ()
@@ -82,8 +86,11 @@ def run(
         )
     if chances:
         statistics = statistics.with_percentiles(chances)
+    both = statistics.resultants((LIKE_3_SIGMA, *chances)) if has_resultants(statistics.dataset) else None
     job.replace_earlier("run", study.system.name)
     job.written += statistics.save(job.folder)
+    if both is not None:
+        job.written += both.save(job.folder)
     with console.status("peaks again by another road"):
         check = _check_peaks(study, statistics)
     if check is not None:
@@ -95,6 +102,8 @@ def run(
         statistics = with_flight_levels(statistics, loads)
         statistics.save(job.folder)
     with steps("figures", len(study.system.outputs) + len(families) + 1) as bar:
+        if both is not None:
+            job.written += _resultant_figures(both, flown.title, job.folder)
         for output in study.system.outputs:
             title = f"{flown.title}\n{words(output.name).capitalize()}, mean and {LABEL}"
             job.written += write_figure(statistics.plot(output.name, title), job.folder, output.name)
@@ -115,6 +124,8 @@ def run(
             files, along = write_along_vehicle(study, end_times, moment_time, job.folder)
             job.written += files
     _print_peaks(statistics)
+    if both is not None:
+        _print_resultants(both)
     for chance in chances:
         _print_instant_levels(statistics, chance)
     if loads:
@@ -205,6 +216,38 @@ def _print_instant_levels(statistics: ResponseStatistics, probability: float) ->
         time = f"{float(at['time']):g} s"
         table.add_row(words(str(name)), time, f"{factor * float(at):.4g} {unit}", str(at["side"].item()))
     console.print(table)
+
+
+def _resultant_figures(both: Resultants, title: str, folder: Path) -> list[Path]:
+    from ..present.style import words, write_figure
+    from ..statistics.resultant_figures import direction_figure, history_figure
+
+    written = []
+    for name in (str(name) for name in both.dataset["resultant"].values):
+        head = f"{title}\n{words(name).capitalize()}"
+        written += write_figure(history_figure(both, name, head), folder, name)
+        written += write_figure(direction_figure(both, name, head), folder, f"{name}_by_direction")
+    return written
+
+
+def _print_resultants(both: Resultants) -> None:
+    from ..present.style import display, words
+
+    for chance in (float(p) for p in both.dataset["probability"].values):
+        table = Table("resultant", title=f"Resultants of pitch and yaw, passed with {chance:.3g} at an instant")
+        for column in ("time", "level", "direction", "spread", "mean in pitch", "in yaw"):
+            table.add_column(column, justify="right", no_wrap=True)
+        for peak in both.peaks(chance):
+            factor, unit = display(peak.unit, peak.value)
+            level, first, second = (f"{factor * x:.4g}" for x in (peak.value, *peak.mean))
+            angles = (f"{math.degrees(angle):.0f}°" for angle in (peak.direction, peak.spread))
+            time = f"{peak.time:g} s{'*' if peak.at_end else ''}"
+            table.add_row(words(peak.resultant), time, f"{level} {unit}", *angles, first, second)
+        console.print(table)
+    console.print(
+        "Direction from +pitch (nose pitching over) towards +yaw (to the right); a norm has no mean + 3 sigma.",
+        style="dim",
+    )
 
 
 def _print_along(found: list[LargestAlong]) -> None:

@@ -53,6 +53,7 @@ VehicleArgument = Annotated[
         autocompletion=_shipped,
     ),
 ]
+WORD = re.compile(r"(?!(true|false|inf|nan)$)[A-Za-z][A-Za-z_]*")  # no TOML value, and so text
 Changes = Annotated[
     list[str] | None,
     typer.Option("--set", help="KEY=VALUE in the place of vehicle.toml's, e.g. options.full_coupling=true."),
@@ -82,6 +83,8 @@ def whole(typed: str | int) -> int:
 def parse_changes(texts: Sequence[str]) -> dict[str, Any]:
     """Return changes to a vehicle's file from 'KEY=VALUE' with a dotted key and a TOML value.
 
+    A word alone is text, which shells rob of its quotes: planes=both.
+
     Raises
     ------
     DataError
@@ -93,7 +96,7 @@ def parse_changes(texts: Sequence[str]) -> dict[str, Any]:
         if not equals or not key.strip():
             raise DataError(f"'{text}' changes nothing; write KEY=VALUE, such as options.full_coupling=true")
         try:
-            read = tomllib.loads(f"value = {value}")
+            read = tomllib.loads(f"value = {value}") if not WORD.fullmatch(value) else {"value": value}
         except (ValueError, RecursionError):
             raise DataError(f"'{value:.60}' is not a TOML value; text needs quotes, true and numbers none") from None
         if list(read) != ["value"]:

@@ -101,6 +101,20 @@ class NormOfNormal:
         """Return the root of E|M|^2 = tr S + |m|^2, (...)."""
         return np.sqrt(np.trace(self.covariance, axis1=-2, axis2=-1) + (self.mean**2).sum(axis=-1))
 
+    def ellipse(self) -> tuple[Array, Array, Array]:
+        """Return the ellipse of one sigma: both standard deviations along its axes, and the larger one's direction.
+
+        Returns
+        -------
+        major, minor : (...) arrays
+            In the unit of the responses.
+        axis : (...) array
+            rad from the first response towards the second, above -pi / 2 and up to pi / 2.
+        """
+        values = np.sqrt(np.maximum(np.linalg.eigvalsh(self.covariance), 0.0))
+        angle = np.arctan2(self._axes[..., 1, 0], self._axes[..., 0, 0])
+        return values[..., 1], values[..., 0], -((-angle + np.pi / 2) % np.pi - np.pi / 2)
+
     def exceedance(self, level: ArrayLike) -> Array:
         """Return P(|M| > level), (...); small ones keep their digits.
 

@@ -19,8 +19,10 @@ from .dataset import QUANTITIES
 from .files import by_response, read_statistics, whole, write_statistics
 from .instant_levels import level_over_time, with_levels
 from .larger_side import SIGMAS
+from .norm import LIKE_3_SIGMA, NormOfNormal
 from .peaks import Peak, peaks
 from .percentiles import Sides
+from .resultants import Resultants, norm_of, resultants
 from .sampling_interval import SamplingInterval, instant_sampling_interval
 
 if TYPE_CHECKING:
@@ -181,6 +183,58 @@ class ResponseStatistics:
         ParameterValueError
         """
         return ResponseStatistics(with_levels(self.dataset, probabilities))
+
+    def norm(self, first: str, second: str, source: str = COMBINED) -> NormOfNormal:
+        """Return the law of the norm of two responses over time: any percentile, its derivatives, directions.
+
+        Parameters
+        ----------
+        first, second : str
+            Responses with one unit, such as bending moments of two planes.
+        source : str
+            From which they vary.
+
+        Returns
+        -------
+        NormOfNormal
+
+        Raises
+        ------
+        UnknownNameError
+        ParameterValueError
+            Of different units, or of an engine that gives no covariance between responses.
+        """
+        return norm_of(whole(self.dataset), first, second, source)
+
+    def resultants(
+        self,
+        probabilities: Iterable[float] = (LIKE_3_SIGMA,),
+        names: Iterable[str] | None = None,
+        sources: Iterable[str] = (COMBINED,),
+    ) -> Resultants:
+        """Return the resultants of both planes: total angle of attack, resultant moment, and the like.
+
+        Parameters
+        ----------
+        probabilities : iterable of float
+            Each a probability with which the resultant exceeds a level at one instant; by default 1 - Phi(3), that of
+            mean + 3 sigma of one response.
+        names : iterable of str, optional
+            Of resultants; all without it.
+        sources : iterable of str
+            From which the responses vary; their means are the same from any.
+
+        Returns
+        -------
+        Resultants
+
+        Raises
+        ------
+        PlanesError
+            Of a system in one plane.
+        UnknownNameError, ParameterValueError
+        """
+        return Resultants(resultants(self._one_table(), probabilities, names, sources))
 
     def sampling_interval(
         self,

@@ -159,7 +159,7 @@ def test_times_are_read():
         (["run", "as504", "--method", "euler"], "method 'euler' is not known"),
         (["run", "as504", "--set", "options.ful_coupling=true"], "did you mean 'full_coupling'"),
         (["run", "as504", "--set", "options.full_coupling"], "write KEY=VALUE"),
-        (["run", "as504", "--set", "options.full_coupling=yes"], "'yes' is not a TOML value"),
+        (["run", "as504", "--set", "options.full_coupling=yes"], "should be a valid boolean (found 'yes')"),
         (["run", "as504", "--set", "bending.7.damping=0.01"], "'7' is not an item of a list of 2; count from 0 to 1"),
         (["run", "as504", "--set", "title.x=1"], "it is a value, not a section"),
         (["inspect", "as504", "--time", "6_0"], "'6_0' is not a number"),

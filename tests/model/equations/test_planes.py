@@ -1,0 +1,146 @@
+"""Two planes as one system: blocks of single planes, signs, the wind by azimuth, deviations in common or apart."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ascentwind.codegen.system.evaluation import MatrixEvaluator
+from ascentwind.model.tables import table_values
+from ascentwind.model.vehicle.planes import flown_planes
+from ascentwind.model.wind.two_components import plane_weights
+from ascentwind.runners import Study
+from tests.support.planes import EACH, HORIZONTAL, in_both, in_one
+
+TIMES = (20.0, 75.0, 120.0)
+
+
+def study(vehicle) -> Study:
+    return Study.from_vehicle(vehicle, compile=False)
+
+
+@pytest.fixture(scope="module")
+def both():
+    return study(in_both())
+
+
+def all_matrices(s: Study, time: float) -> dict:
+    names = ("A", "B", "C", "D", "E", "G")
+    return dict(zip(names, MatrixEvaluator(s.with_means, names)(time, s.system.start, s.system.end), strict=True))
+
+
+def rows(system, prefix: str, names) -> list[int]:
+    return [system.state_names.index(prefix + name) for name in names]
+
+
+@pytest.mark.parametrize(("plane", "component"), [("yaw", "zonal"), ("pitch", "meridional")])
+def test_azimuth_zero_with_a_deviation_each_is_the_plane_alone(plane, component):
+    """At azimuth 0 yaw meets u and pitch meets v: every entry of every matrix is that of the plane alone."""
+    joint = study(in_both(HORIZONTAL | EACH, independent=True)).with_parameters({"wind.azimuth": 0.0})
+    alone = study(in_one(plane, component, HORIZONTAL))
+    system, single = joint.system, alone.system
+    own = [name for name in single.state_names if not name.startswith(("wind", "deviation"))]
+    first = 0 if component == "zonal" else 3
+    states = rows(system, f"{plane}_", own)
+    states += [system.state_names.index(f"wind_{first + k}") for k in (1, 2, 3)]
+    states += [system.state_names.index(f"deviation_{n}_{plane}") for n in ("thrust", "center_of_pressure")]
+    noises = [f"wind_{2 * (first // 3) + k}" for k in (1, 2)] + [
+        f"{n}_{plane}" for n in ("thrust", "center_of_pressure")
+    ]
+    columns = [system.noise_names.index(name) for name in noises]
+    inputs = [system.input_names.index(f"wind_{component}"), system.input_names.index("undisturbed_flight")]
+    shared = [n for n in single.output_names if f"{plane}_{n}" in system.output_names]
+    outputs = [system.output_index(f"{plane}_{n}") for n in shared]
+    for time in TIMES:
+        found, expected = all_matrices(joint, time), all_matrices(alone, time)
+        kept = [single.output_index(n) for n in shared]
+        for name, at, one in (
+            ("A", np.ix_(states, states), np.s_[:, :]),
+            ("B", np.ix_(states, columns), np.s_[:, :]),
+            ("C", np.ix_(outputs, states), np.s_[kept]),
+            ("D", np.ix_(outputs, columns), np.s_[kept]),
+            ("E", np.ix_(states, inputs), np.s_[:, :]),
+            ("G", np.ix_(outputs, inputs), np.s_[kept]),
+        ):
+            scale = np.abs(expected[name]).max() or 1.0
+            np.testing.assert_allclose(
+                found[name][at], expected[name][one], rtol=1e-12, atol=1e-9 * scale, err_msg=name
+            )
+        # nothing else reaches the plane
+        others = [k for k in range(len(system.states)) if k not in states]
+        assert not found["A"][np.ix_(states[: len(own)], others)].any()
+
+
+def test_planes_meet_in_wind_and_deviations_alone(both):
+    system = both.system
+    pitch, yaw = ([i for i, n in enumerate(system.state_names) if n.startswith(p)] for p in ("pitch_", "yaw_"))
+    A = all_matrices(both, 75.0)["A"]
+    assert not A[np.ix_(pitch, yaw)].any() and not A[np.ix_(yaw, pitch)].any()
+    for name in ("deviation_thrust", "deviation_center_of_pressure"):
+        column = A[:, system.state_names.index(name)]
+        assert column[pitch].any() and column[yaw].any()
+
+
+@pytest.mark.parametrize("azimuth", [0.0, 0.7, 2.0, 4.0])
+def test_wind_is_turned_by_the_azimuth(both, azimuth):
+    """The angle of attack feels W / V: u cos Az - v sin Az in yaw, (u sin Az + v cos Az) sin gamma in pitch."""
+    s = both.with_parameters({"wind.azimuth": azimuth})
+    for time in TIMES:
+        G, at = all_matrices(s, time)["G"], s.tables(time)
+        sine = at["altitude_rate"] / at["relative_velocity"]
+        for plane, factor in (("pitch", sine), ("yaw", 1.0)):
+            row = G[s.system.output_index(f"{plane}_angle_of_attack"), :2]
+            expected = factor * np.array(plane_weights(azimuth, plane)) / at["relative_velocity"]
+            np.testing.assert_allclose(row, expected, rtol=1e-12, atol=1e-18)
+
+
+def test_pitch_alone_takes_the_part_across_the_path():
+    s = study(in_one("pitch", "zonal"))
+    G, at = all_matrices(s, 75.0)["G"], s.tables(75.0)
+    expected = at["altitude_rate"] / at["relative_velocity"] ** 2
+    assert G[s.system.output_index("angle_of_attack"), 0] == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_tail_wind_pitches_over_and_turns_to_a_positive_angle(both):
+    """With azimuth 90 a wind towards the east is a tail wind: positive angle of attack in pitch, nothing in yaw."""
+    vehicle = in_both()
+    east = replace(vehicle.wind.zonal.mean, values=np.full_like(vehicle.wind.zonal.mean.values, 10.0))
+    still = replace(vehicle.wind.meridional.mean, values=np.zeros_like(east.values))
+    wind = replace(
+        vehicle.wind,
+        zonal=replace(vehicle.wind.zonal, mean=east),
+        meridional=replace(vehicle.wind.meridional, mean=still),
+    )
+    s = study(replace(vehicle, wind=wind)).with_parameters({"wind.azimuth": np.pi / 2})
+    mean = s.with_means
+    tables = table_values(mean.groups, 75.0)
+    assert tables["pitch.mean.angle_of_attack"] > 0.005
+    assert tables["yaw.mean.angle_of_attack"] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_start_covariance_holds_the_correlation_of_the_surface_winds(both):
+    P = both.system.start_covariance["wind"]
+    rows = both.system.block("wind")
+    wind = np.asarray(P)[rows, rows]
+    H = both.vehicle.wind.shaping_filter.at(float(both.start_altitude))[2]
+    u, v = (np.where(np.arange(6) < 3, H, 0.0), np.where(np.arange(6) < 3, 0.0, H))
+    r = u @ wind @ v / np.sqrt((u @ wind @ u) * (v @ wind @ v))
+    assert r == pytest.approx(-0.216, abs=0.05)
+
+
+def test_own_deviations_have_own_noises_of_the_same_source():
+    s = study(in_both(EACH)).system
+    assert [n.name for n in s.noises if n.source == "thrust"] == ["thrust_pitch", "thrust_yaw"]
+    assert "thrust" in s.sources and s.parameter_names.count("thrust.sigma") == 1
+
+
+def test_axial_force_belongs_to_no_plane(both):
+    assert both.system.output_names.count("axial_force") == 1
+    assert "pitch_axial_force" not in both.system.output_names
+
+
+def test_one_plane_keeps_its_names():
+    plane = flown_planes(in_one("yaw", "zonal"))
+    assert [(p.name, p.prefix, p.scope) for p in plane] == [("yaw", "", "")]
