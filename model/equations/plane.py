@@ -21,7 +21,6 @@ from .motion import Motion
 from .outputs import outputs
 from .typical_sizes import SCALES
 from .vehicle_numbers import Numbers
-from .wind import in_plane
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,6 +103,23 @@ def plane_equations(plane: Plane, numbers: Numbers, turbulence: ca.SX, winds: Wi
     blocks = _with_rates(blocks, rates, plane.prefix)
     labels = tuple(_named(plane, label) for label, _ in responses)
     return PlaneEquations(tuple(blocks[:moving]), tuple(blocks[moving:]), labels, output, solved.matrix)
+
+
+def in_plane(plane: Plane, numbers: Numbers, winds: Sequence[ca.SX]) -> ca.SX:
+    """Return the wind across the path in a plane, m/s, of one wind or of what blows towards the east and the north.
+
+    Yaw: u cos Az - v sin Az, the whole of it. Pitch: that along the heading, u sin Az + v cos Az, acts by its part
+    normal to the path, times sin gamma = hdot / V; it blows downrange in the direction in which the vehicle pitches
+    over.
+    """
+    if len(winds) == 1:
+        wind = winds[0]
+    else:
+        sine, cosine, (u, v) = ca.sin(numbers.azimuth), ca.cos(numbers.azimuth), winds
+        wind = u * sine + v * cosine if plane.name == "pitch" else u * cosine - v * sine
+    if plane.name == "yaw" or plane.vehicle.file.wind.pitch_wind == "horizontal":
+        return wind
+    return numbers.tables["altitude_rate"] / numbers.tables["relative_velocity"] * wind
 
 
 def _with_rates(blocks: Sequence[Block], rates: ca.SX, prefix: str) -> list[Block]:

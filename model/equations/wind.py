@@ -6,17 +6,14 @@ intensity in time with the gain sqrt(hdot), because delta(h - h') = delta(t - t'
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import casadi as ca
 
 from ..system.symbols import TableSymbols
-from ..vehicle.planes import Plane
 from ..wind.shaping_filter import entry_name
 from ..wind.statistics import WindModel
 from ..wind.two_components import TwoComponentWind
-from .vehicle_numbers import Numbers
 
 
 @dataclass(frozen=True)
@@ -45,20 +42,3 @@ def wind_block(wind: WindModel | TwoComponentWind, tables: TableSymbols, rate: c
         return WindBlock(z, derivative, white, (scale * (matrices["H"] @ z),))
     H, first = matrices["H"], wind.zonal.shaping_filter.order
     return WindBlock(z, derivative, white, (scale * (H[:, :first] @ z[:first]), scale * (H[:, first:] @ z[first:])))
-
-
-def in_plane(plane: Plane, numbers: Numbers, winds: Sequence[ca.SX]) -> ca.SX:
-    """Return the wind across the path in a plane, m/s, of one wind or of what blows towards the east and the north.
-
-    Yaw: u cos Az - v sin Az, the whole of it. Pitch: that along the heading, u sin Az + v cos Az, acts by its part
-    normal to the path, times sin gamma = hdot / V; it blows downrange in the direction in which the vehicle pitches
-    over.
-    """
-    if len(winds) == 1:
-        wind = winds[0]
-    else:
-        sine, cosine, (u, v) = ca.sin(numbers.azimuth), ca.cos(numbers.azimuth), winds
-        wind = u * sine + v * cosine if plane.name == "pitch" else u * cosine - v * sine
-    if plane.name == "yaw" or plane.vehicle.file.wind.pitch_wind == "horizontal":
-        return wind
-    return numbers.tables["altitude_rate"] / numbers.tables["relative_velocity"] * wind

@@ -450,7 +450,7 @@ def _load_both(entry: WindEntry, reader: _Reader) -> TwoComponentWind:
     csv = reader.read("wind", parts.statistics, WIND_COMPONENTS, ALTITUDE)
     h, record = csv.columns["altitude"], None
     if r is None:
-        _warn_of_no_record(reader.toml, "--components both")
+        _warn_of_no_record(reader.toml, "wind.components.record", "--components both")
     else:
         origin = WindOrigin(r.site, BOTH, r.period, r.edition)
         azimuth = math.radians(entry.azimuth_deg)
@@ -577,10 +577,10 @@ def _load_turbulence(
         raise DataError(error.why, file=file, column="wind.turbulence") from None
 
 
-def _warn_of_no_record(toml: Path, option: str) -> None:
+def _warn_of_no_record(toml: Path, section: str, option: str) -> None:
     warnings.warn(
         WindWarning(
-            f"{toml} holds no record of its wind: nobody can tell whether mean and filter are of one wind; 'ascentwind "
+            f"{toml} holds no [{section}]: nobody can tell whether mean and filter are of one wind; 'ascentwind "
             f"wind apply VEHICLE {option}' writes filter, mean and record together"
         ),
         stacklevel=5,
@@ -589,7 +589,7 @@ def _warn_of_no_record(toml: Path, option: str) -> None:
 
 def _wind_record(entry: WindRecordEntry | None, plane: str, toml: Path) -> WindRecord | None:
     if entry is None:
-        _warn_of_no_record(toml, "--component zonal|meridional")
+        _warn_of_no_record(toml, "wind.record", "--component zonal|meridional")
         return None
     origin = WindOrigin(entry.site, entry.component, entry.period, entry.edition)
     try:
