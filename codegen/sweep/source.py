@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import casadi as ca
@@ -10,6 +11,7 @@ from ...model.system.linear_system import LinearSystem
 from ..toolchain.c_printer import c_function, c_statements, enumerators
 from ..toolchain.fingerprint import fingerprint
 from ..toolchain.templates import render
+from .kinds import Kind, kinds, spans
 from .runge_kutta import DOP853, RungeKutta
 
 LANES = 8  # columns side by side: one 512-bit register, two of 256 bits
@@ -46,7 +48,7 @@ def sweep_functions(system: LinearSystem) -> SweepFunctions:
 
 def sweep_fingerprint(system: LinearSystem, functions: SweepFunctions) -> str:
     """Return a hash of all that ``sweep_source`` writes from."""
-    files = ("sweep/source.py", "sweep/runge_kutta.py", "templates/sweep.c.jinja")
+    files = ("sweep/source.py", "sweep/kinds.py", "sweep/runge_kutta.py", "templates/sweep.c.jinja")
     return fingerprint(system, (functions.stage, functions.output), files)
 
 
@@ -61,6 +63,11 @@ def sweep_source(system: LinearSystem, functions: SweepFunctions, formula: Runge
     C = functions.output.sparsity_out(0)
     noises = [(i, k) for k, source in enumerate(system.sources) for i in system.noise_columns(source)]
     weighted = [i for i, b in enumerate(formula.weights) if b != 0.0]
+    of = kinds(A, LANES)
+    place, own_row = _places(of, n)
+    by_noise = _entries(B, by_row=False)
+    columns = [by_noise[i] for i, _ in noises]
+    reached = [spans(of, (row for _, row in column), LANES) for column in columns]
     return render(
         "sweep.c.jinja",
         title=f"{system.name}: all end times in one pass",
@@ -71,21 +78,56 @@ def sweep_source(system: LinearSystem, functions: SweepFunctions, formula: Runge
         enumerators=[e for e in (names["v"], names["p"]) if e],
         lanes=LANES,
         most_steps=MOST_STEPS,
-        blocks=-(-n // LANES),
+        blocks=sum(kind.blocks for kind in of),
+        kinds=[_kind(kind, A, columns, known.row()) for kind in of],
+        first_of_kind=[kind.first * LANES for kind in of for _ in range(kind.blocks)],
+        most_rows=max(len(kind.rows) for kind in of),
+        place=place,
+        own_row=own_row,
+        reaches=[(i, *span) for i, found in enumerate(reached) for span in found],
+        products=[
+            (i, *rows, *over) for i, found in enumerate(reached) for k, rows in enumerate(found) for over in found[k:]
+        ],
         nonzeros={"A": A.nnz(), "B": B.nnz(), "known": known.nnz(), "C": C.nnz()},
         stage_statements=c_statements(
             stage, ("t", "v", "p"), ("A", "B", "known"), names, dict.fromkeys(("t", "v", "A", "B", "known"), "j")
         ),
         output_function=c_function("output", functions.output, ("t", "v", "p"), ("C", "direct"), names),
         rows=_entries(A, by_row=True),
-        columns=_entries(A, by_row=False),
-        noise_columns=[_entries(B, by_row=False)[i] for i, _ in noises],
+        noise_columns=columns,
         noise_sources=[k for _, k in noises],
         known_rows=known.row(),
         output_rows=_entries(C, by_row=True),
         formula=formula,
         weighted=weighted,
     )
+
+
+def _places(of: Sequence[Kind], states: int) -> tuple[list[int], list[int]]:
+    """Return the column of each state's adjoint, and the row of the state in its own block."""
+    place, own_row = [0] * states, [0] * states
+    for kind in of:
+        for k, state in enumerate(kind.states):
+            place[state] = kind.first * LANES + k
+            own_row[state] = kind.rows.index(state)
+    return place, own_row
+
+
+def _kind(kind: Kind, A: ca.Sparsity, noises: list[list[tuple[int, int]]], known: list[int]) -> dict[str, object]:
+    """Return what a kind of blocks is written from: entries of A, B and E u by the rows that they have in it."""
+    at = {state: row for row, state in enumerate(kind.rows)}
+    by_state = _entries(A, by_row=False)
+    within = [[(k, at[i]) for k, i in column if i in at] for column in noises]
+    return {
+        "index": kind.index,
+        "states": kind.states,
+        "rows": kind.rows,
+        "first": kind.first,
+        "blocks": kind.blocks,
+        "columns": [[(k, at[i]) for k, i in by_state[state] if i in at] for state in kind.rows],
+        "noises": [(n, column) for n, column in enumerate(within) if column],
+        "known": [(n, at[i]) for n, i in enumerate(known) if i in at],
+    }
 
 
 def _groups(system: LinearSystem) -> list[dict[str, object]]:

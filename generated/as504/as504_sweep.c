@@ -9,6 +9,7 @@
  *   lambda' = -A' lambda
  * is integrated backward from every unit vector at once, 8 columns to a block, so that a block and all its
  * stages stay in the first-level cache; A is evaluated for all stages of a step before the first block, side by side.
+ * Columns stand together by the states that reach theirs (kinds of blocks): the others are zero and left out.
  * At the start of the segment the columns are the rows of its transition matrix Phi, and along the way
  *   W = integral of (B' lambda)' (B' lambda)  for each source,   z = integral of lambda' E u
  * are quadratures with the weights of the formula. Then, forward, P = Phi P Phi' + W and m = Phi m + z.
@@ -37,7 +38,7 @@
 #endif
 
 enum {
-  STATES = 31, LANES = 8, BLOCKS = 4, COLUMNS = BLOCKS * LANES,
+  STATES = 31, LANES = 8, BLOCKS = 4, COLUMNS = BLOCKS * LANES, ROWS = 31, /* most of a block */
   STAGES = 12, NODES = 8, /* stages whose weight is not zero */
   SOURCES = 3, NOISES = 4, RESPONSES = 8,
   HORIZON = 5, /* segments over which effects are followed to weigh errors */
@@ -2687,15 +2688,26 @@ static void respond(const double *C, const double *direct, const double *x, doub
 /* ---- Backward: one block of adjoint columns over one step ---- */
 
 typedef struct {
-  double next[BLOCKS][STATES * LANES];
+  double next[BLOCKS][ROWS * LANES];
   double noise[NOISES_1][NODES][COLUMNS]; /* B' lambda at the stages that carry weight */
   double known[NODES][COLUMNS];           /* (E u)' lambda at the same */
   double error[COLUMNS];                  /* of each column, weighed, for control */
   double remaining[COLUMNS];              /* the same for the report */
 } Step;
 
-/* A' x at stage i */
-static inline void adjoint_rate(const double (*restrict A)[STAGES], const int i, const double *restrict x, double *restrict rate) {
+/* One error from the squares of two, of order 5 and 3, in the manner of DOP853 */
+static inline double combined(double h, double fine, double coarse) {
+  return h * fine / sqrt(fine + 0.01 * coarse + 1e-300);
+}
+
+/* The error of order 8 that remains, continued from those of order 3 and 5 as a geometric series in h^2, doubled */
+static inline double remaining(double h, double fine, double coarse) {
+  const double ratio = smaller(1.0, fine / (coarse + 1e-300)); /* (e5 / e3)^2 */
+  return 2.0 * h * sqrt(fine * ratio * sqrt(ratio));
+}
+
+/* A' x at stage i, of 31 rows */
+static inline void adjoint_rate_0(const double (*restrict A)[STAGES], const int i, const double *restrict x, double *restrict rate) {
   int j;
   for (j = 0; j < LANES; ++j) {
     const double x0 = x[0 + j];
@@ -2765,7 +2777,7 @@ static inline void adjoint_rate(const double (*restrict A)[STAGES], const int i,
 }
 
 /* What the quadratures need of stage number `stage`, which is weighted number `at` */
-static inline void record(const Matrices *restrict m, const int stage, const int at, const double *restrict x,
+static inline void record_0(const Matrices *restrict m, const int stage, const int at, const double *restrict x,
                           Step *restrict s, const int first) {
   int j;
   for (j = 0; j < LANES; ++j) {
@@ -2778,104 +2790,93 @@ static inline void record(const Matrices *restrict m, const int stage, const int
   (void)m; (void)stage; (void)at; (void)x;
 }
 
-/* One error from the squares of two, of order 5 and 3, in the manner of DOP853 */
-static inline double combined(double h, double fine, double coarse) {
-  return h * fine / sqrt(fine + 0.01 * coarse + 1e-300);
-}
-
-/* The error of order 8 that remains, continued from those of order 3 and 5 as a geometric series in h^2, doubled */
-static inline double remaining(double h, double fine, double coarse) {
-  const double ratio = smaller(1.0, fine / (coarse + 1e-300)); /* (e5 / e3)^2 */
-  return 2.0 * h * sqrt(fine * ratio * sqrt(ratio));
-}
-
 /* One step of length h of the columns first ... first + LANES - 1, and its error by the formulas of order 5 and 3. */
-static void step_block(const Matrices *restrict m, const double h, const double *restrict x, const double *restrict weight,
+static void step_block_0(const Matrices *restrict m, const double h, const double *restrict x, const double *restrict weight,
                        Step *restrict s, const int block) {
-  double k[STAGES][STATES * LANES], y[STATES * LANES], fine[LANES], coarse[LANES];
+  double k[STAGES][31 * LANES], y[31 * LANES], fine[LANES], coarse[LANES];
   double *restrict next = s->next[block];
   const int first = block * LANES;
   int i, j;
   for (j = 0; j < LANES; ++j) fine[j] = coarse[j] = 0.0;
-  adjoint_rate(m->A, 0, x, k[0]);
-  record(m, 0, 0, x, s, first);
+  adjoint_rate_0(m->A, 0, x, k[0]);
+  record_0(m, 0, 0, x, s, first);
   {
     const double c0 = h * 0.05260015195876773;
-    for (i = 0; i < STATES * LANES; ++i) y[i] = x[i] + c0 * k[0][i];
+    for (i = 0; i < 31 * LANES; ++i) y[i] = x[i] + c0 * k[0][i];
   }
-  adjoint_rate(m->A, 1, y, k[1]);
+  adjoint_rate_0(m->A, 1, y, k[1]);
   {
     const double c0 = h * 0.0197250569845379; const double c1 = h * 0.0591751709536137;
-    for (i = 0; i < STATES * LANES; ++i) y[i] = x[i] + c0 * k[0][i] + c1 * k[1][i];
+    for (i = 0; i < 31 * LANES; ++i) y[i] = x[i] + c0 * k[0][i] + c1 * k[1][i];
   }
-  adjoint_rate(m->A, 2, y, k[2]);
+  adjoint_rate_0(m->A, 2, y, k[2]);
   {
     const double c0 = h * 0.02958758547680685; const double c2 = h * 0.08876275643042054;
-    for (i = 0; i < STATES * LANES; ++i) y[i] = x[i] + c0 * k[0][i] + c2 * k[2][i];
+    for (i = 0; i < 31 * LANES; ++i) y[i] = x[i] + c0 * k[0][i] + c2 * k[2][i];
   }
-  adjoint_rate(m->A, 3, y, k[3]);
+  adjoint_rate_0(m->A, 3, y, k[3]);
   {
     const double c0 = h * 0.2413651341592667; const double c2 = h * (-0.8845494793282861); const double c3 = h *
     0.924834003261792;
-    for (i = 0; i < STATES * LANES; ++i) y[i] = x[i] + c0 * k[0][i] + c2 * k[2][i] + c3 * k[3][i];
+    for (i = 0; i < 31 * LANES; ++i) y[i] = x[i] + c0 * k[0][i] + c2 * k[2][i] + c3 * k[3][i];
   }
-  adjoint_rate(m->A, 4, y, k[4]);
+  adjoint_rate_0(m->A, 4, y, k[4]);
   {
     const double c0 = h * 0.037037037037037035; const double c3 = h * 0.17082860872947386; const double c4 = h *
     0.12546768756682242;
-    for (i = 0; i < STATES * LANES; ++i) y[i] = x[i] + c0 * k[0][i] + c3 * k[3][i] + c4 * k[4][i];
+    for (i = 0; i < 31 * LANES; ++i) y[i] = x[i] + c0 * k[0][i] + c3 * k[3][i] + c4 * k[4][i];
   }
-  adjoint_rate(m->A, 5, y, k[5]);
-  record(m, 5, 1, y, s, first);
+  adjoint_rate_0(m->A, 5, y, k[5]);
+  record_0(m, 5, 1, y, s, first);
   {
     const double c0 = h * 0.037109375; const double c3 = h * 0.17025221101954405; const double c4 = h *
     0.06021653898045596; const double c5 = h * (-0.017578125);
-    for (i = 0; i < STATES * LANES; ++i) y[i] = x[i] + c0 * k[0][i] + c3 * k[3][i] + c4 * k[4][i] + c5 * k[5][i];
+    for (i = 0; i < 31 * LANES; ++i) y[i] = x[i] + c0 * k[0][i] + c3 * k[3][i] + c4 * k[4][i] + c5 * k[5][i];
   }
-  adjoint_rate(m->A, 6, y, k[6]);
-  record(m, 6, 2, y, s, first);
+  adjoint_rate_0(m->A, 6, y, k[6]);
+  record_0(m, 6, 2, y, s, first);
   {
     const double c0 = h * 0.03709200011850479; const double c3 = h * 0.17038392571223998; const double c4 = h *
     0.10726203044637328; const double c5 = h * (-0.015319437748624402); const double c6 = h * 0.008273789163814023;
-    for (i = 0; i < STATES * LANES; ++i) y[i] = x[i] + c0 * k[0][i] + c3 * k[3][i] + c4 * k[4][i] + c5 * k[5][i] + c6 * k[6][i];
+    for (i = 0; i < 31 * LANES; ++i) y[i] = x[i] + c0 * k[0][i] + c3 * k[3][i] + c4 * k[4][i] + c5 * k[5][i] + c6 * k[6][i];
   }
-  adjoint_rate(m->A, 7, y, k[7]);
-  record(m, 7, 3, y, s, first);
+  adjoint_rate_0(m->A, 7, y, k[7]);
+  record_0(m, 7, 3, y, s, first);
   {
     const double c0 = h * 0.6241109587160757; const double c3 = h * (-3.3608926294469414); const double c4 = h *
     (-0.868219346841726); const double c5 = h * 27.59209969944671; const double c6 = h * 20.154067550477894; const
     double c7 = h * (-43.48988418106996);
-    for (i = 0; i < STATES * LANES; ++i) y[i] = x[i] + c0 * k[0][i] + c3 * k[3][i] + c4 * k[4][i] + c5 * k[5][i] + c6 * k[6][i] + c7 * k[7][i];
+    for (i = 0; i < 31 * LANES; ++i) y[i] = x[i] + c0 * k[0][i] + c3 * k[3][i] + c4 * k[4][i] + c5 * k[5][i] + c6 * k[6][i] + c7 * k[7][i];
   }
-  adjoint_rate(m->A, 8, y, k[8]);
-  record(m, 8, 4, y, s, first);
+  adjoint_rate_0(m->A, 8, y, k[8]);
+  record_0(m, 8, 4, y, s, first);
   {
     const double c0 = h * 0.47766253643826434; const double c3 = h * (-2.4881146199716677); const double c4 = h *
     (-0.590290826836843); const double c5 = h * 21.230051448181193; const double c6 = h * 15.279233632882423; const
     double c7 = h * (-33.28821096898486); const double c8 = h * (-0.020331201708508627);
-    for (i = 0; i < STATES * LANES; ++i) y[i] = x[i] + c0 * k[0][i] + c3 * k[3][i] + c4 * k[4][i] + c5 * k[5][i] + c6 * k[6][i] + c7 * k[7][i] + c8 * k[8][i];
+    for (i = 0; i < 31 * LANES; ++i) y[i] = x[i] + c0 * k[0][i] + c3 * k[3][i] + c4 * k[4][i] + c5 * k[5][i] + c6 * k[6][i] + c7 * k[7][i] + c8 * k[8][i];
   }
-  adjoint_rate(m->A, 9, y, k[9]);
-  record(m, 9, 5, y, s, first);
+  adjoint_rate_0(m->A, 9, y, k[9]);
+  record_0(m, 9, 5, y, s, first);
   {
     const double c0 = h * (-0.9371424300859873); const double c3 = h * 5.186372428844064; const double c4 = h *
     1.0914373489967295; const double c5 = h * (-8.149787010746927); const double c6 = h * (-18.52006565999696);
     const double c7 = h * 22.739487099350505; const double c8 = h * 2.4936055526796523; const double c9 = h *
     (-3.0467644718982196);
-    for (i = 0; i < STATES * LANES; ++i) y[i] = x[i] + c0 * k[0][i] + c3 * k[3][i] + c4 * k[4][i] + c5 * k[5][i] + c6 * k[6][i] + c7 * k[7][i] + c8 * k[8][i] + c9 * k[9][i];
+    for (i = 0; i < 31 * LANES; ++i) y[i] = x[i] + c0 * k[0][i] + c3 * k[3][i] + c4 * k[4][i] + c5 * k[5][i] + c6 * k[6][i] + c7 * k[7][i] + c8 * k[8][i] + c9 * k[9][i];
   }
-  adjoint_rate(m->A, 10, y, k[10]);
-  record(m, 10, 6, y, s, first);
+  adjoint_rate_0(m->A, 10, y, k[10]);
+  record_0(m, 10, 6, y, s, first);
   {
     const double c0 = h * 2.273310147516538; const double c3 = h * (-10.53449546673725); const double c4 = h *
     (-2.0008720582248625); const double c5 = h * (-17.9589318631188); const double c6 = h * 27.94888452941996; const
     double c7 = h * (-2.8589982771350235); const double c8 = h * (-8.87285693353063); const double c9 = h *
     12.360567175794303; const double c10 = h * 0.6433927460157636;
-    for (i = 0; i < STATES * LANES; ++i) y[i] = x[i] + c0 * k[0][i] + c3 * k[3][i] + c4 * k[4][i] + c5 * k[5][i] + c6 * k[6][i] + c7 * k[7][i] + c8 * k[8][i] + c9 * k[9][i] + c10 * k[10][i];
+    for (i = 0; i < 31 * LANES; ++i) y[i] = x[i] + c0 * k[0][i] + c3 * k[3][i] + c4 * k[4][i] + c5 * k[5][i] + c6 * k[6][i] + c7 * k[7][i] + c8 * k[8][i] + c9 * k[9][i] + c10 * k[10][i];
   }
-  adjoint_rate(m->A, 11, y, k[11]);
-  record(m, 11, 7, y, s, first);
-  for (i = 0; i < STATES; ++i)
+  adjoint_rate_0(m->A, 11, y, k[11]);
+  record_0(m, 11, 7, y, s, first);
+  for (i = 0; i < 31; ++i)
     for (j = 0; j < LANES; ++j) {
       const int n = i * LANES + j;
       const double w = weight[n], slope = + 0.054293734116568765 * k[0][n] + 4.450312892752409 * k[5][n] + 1.8915178993145003 * k[6][n] - 5.801203960010585 * k[7][n] + 0.3111643669578199 * k[8][n] - 0.1521609496625161 * k[9][n] + 0.20136540080403034 * k[10][n] + 0.04471061572777259 * k[11][n] ;
@@ -2891,19 +2892,30 @@ static void step_block(const Matrices *restrict m, const double h, const double 
   }
 }
 
+/* Noise, and first and last column of those that it reaches */
+enum { REACHES = 4 };
+static const int reach[4][3] = { { 0, 0, 32 }, { 1, 0, 32 }, { 2, 0, 32 }, { 3, 0, 32 } };
+
+/* Add the error of a noise's quadrature over a step of length h to that of one block of columns, w the gain of each. */
+static inline void add_noise_error(const double h, const double *restrict w, const double (*restrict g)[COLUMNS],
+                                   double *restrict error, double *restrict left) {
+  int j;
+  for (j = 0; j < LANES; ++j) {
+    const double square = w[j] * w[j];
+    const double e5 = square * ((0.01312004499419488) * g[0][j] * g[0][j] + (-1.2251564463762044) * g[1][j] * g[1][j] + (-0.4957589496572502) * g[2][j] * g[2][j] + (1.6643771824549864) * g[3][j] * g[3][j] + (-0.35032884874997366) * g[4][j] * g[4][j] + (0.3341791187130175) * g[5][j] * g[5][j] + (0.08192320648511571) * g[6][j] * g[6][j] + (-0.022355307863886294) * g[7][j] * g[7][j]);
+    const double e3 = square * ((-0.18980075407240762) * g[0][j] * g[0][j] + (4.450312892752409) * g[1][j] * g[1][j] + (1.8915178993145003) * g[2][j] * g[2][j] + (-5.801203960010585) * g[3][j] * g[3][j] + (-0.4226823213237919) * g[4][j] * g[4][j] + (-0.1521609496625161) * g[5][j] * g[5][j] + (0.20136540080403034) * g[6][j] * g[6][j] + (0.02265179219836082) * g[7][j] * g[7][j]);
+    error[j] += combined(h, e5 * e5, e3 * e3);
+    left[j] += remaining(h, e5 * e5, e3 * e3);
+  }
+}
+
 /* Add the errors of the quadratures over a step of length h to those of its columns; gain: effect of each state on the
  * responses, relative to their standard deviation, for each source and for the mean. */
 static void add_quadrature_errors(const double h, const double (*restrict gain)[COLUMNS], Step *restrict s) {
-  int i, j;
-  for (i = 0; i < NOISES; ++i)
-    for (j = 0; j < COLUMNS; ++j) {
-      const double (*g)[COLUMNS] = (const double (*)[COLUMNS])s->noise[i];
-      const double w = gain[noise_source[i]][j] * gain[noise_source[i]][j];
-      const double e5 = w * ((0.01312004499419488) * g[0][j] * g[0][j] + (-1.2251564463762044) * g[1][j] * g[1][j] + (-0.4957589496572502) * g[2][j] * g[2][j] + (1.6643771824549864) * g[3][j] * g[3][j] + (-0.35032884874997366) * g[4][j] * g[4][j] + (0.3341791187130175) * g[5][j] * g[5][j] + (0.08192320648511571) * g[6][j] * g[6][j] + (-0.022355307863886294) * g[7][j] * g[7][j]);
-      const double e3 = w * ((-0.18980075407240762) * g[0][j] * g[0][j] + (4.450312892752409) * g[1][j] * g[1][j] + (1.8915178993145003) * g[2][j] * g[2][j] + (-5.801203960010585) * g[3][j] * g[3][j] + (-0.4226823213237919) * g[4][j] * g[4][j] + (-0.1521609496625161) * g[5][j] * g[5][j] + (0.20136540080403034) * g[6][j] * g[6][j] + (0.02265179219836082) * g[7][j] * g[7][j]);
-      s->error[j] += combined(h, e5 * e5, e3 * e3);
-      s->remaining[j] += remaining(h, e5 * e5, e3 * e3);
-    }
+  int i, j, k;
+  for (k = 0; k < REACHES; ++k)
+    for (i = reach[k][0], j = reach[k][1]; j < reach[k][2]; j += LANES)
+      add_noise_error(h, gain[noise_source[i]] + j, (const double (*)[COLUMNS])(s->noise[i][0] + j), s->error + j, s->remaining + j);
   for (j = 0; j < COLUMNS; ++j) {
     const double e5 = gain[SOURCES][j] * ((0.01312004499419488) * s->known[0][j] + (-1.2251564463762044) * s->known[1][j] + (-0.4957589496572502) * s->known[2][j] + (1.6643771824549864) * s->known[3][j] + (-0.35032884874997366) * s->known[4][j] + (0.3341791187130175) * s->known[5][j] + (0.08192320648511571) * s->known[6][j] + (-0.022355307863886294) * s->known[7][j]);
     const double e3 = gain[SOURCES][j] * ((-0.18980075407240762) * s->known[0][j] + (4.450312892752409) * s->known[1][j] + (1.8915178993145003) * s->known[2][j] + (-5.801203960010585) * s->known[3][j] + (-0.4226823213237919) * s->known[4][j] + (-0.1521609496625161) * s->known[5][j] + (0.20136540080403034) * s->known[6][j] + (0.02265179219836082) * s->known[7][j]);
@@ -2912,35 +2924,48 @@ static void add_quadrature_errors(const double h, const double (*restrict gain)[
   }
 }
 
-/* Add one step's integral of g g' to the upper blocks of W. */
-static void add_products(const double (*restrict g)[COLUMNS], const double h, double (*restrict W)[COLUMNS]) {
-  int r, c;
-  for (r = 0; r < STATES; ++r) {
-    const double a0 = h * node_weight[0] * g[0][r];
-    const double a1 = h * node_weight[1] * g[1][r];
-    const double a2 = h * node_weight[2] * g[2][r];
-    const double a3 = h * node_weight[3] * g[3][r];
-    const double a4 = h * node_weight[4] * g[4][r];
-    const double a5 = h * node_weight[5] * g[5][r];
-    const double a6 = h * node_weight[6] * g[6][r];
-    const double a7 = h * node_weight[7] * g[7][r];
-    for (c = r / LANES * LANES; c < COLUMNS; ++c)
-      W[r][c] += a0 * g[0][c] + a1 * g[1][c] + a2 * g[2][c] + a3 * g[3][c] + a4 * g[4][c] + a5 * g[5][c] + a6 * g[6][c] + a7 * g[7][c];
+/* Noise, and the rows and columns of W that it adds to: upper blocks */
+enum { PRODUCTS = 4 };
+static const int product[4][5] = { { 0, 0, 32, 0, 32 }, { 1, 0, 32, 0, 32 }, { 2, 0, 32, 0, 32 }, { 3, 0, 32, 0, 32 } };
+
+/* Add one step's integral of g g' to the upper blocks of W, two rows at a time. */
+static void add_products(const double (*restrict g)[COLUMNS], const double h, double (*restrict W)[COLUMNS],
+                         const int *restrict of) {
+  int r, c, j;
+  for (r = of[1]; r < of[2]; r += 2) {
+    double *restrict first = W[r], *restrict second = W[r + 1];
+    const double a0 = h * node_weight[0] * g[0][r], b0 = h * node_weight[0] * g[0][r + 1];
+    const double a1 = h * node_weight[1] * g[1][r], b1 = h * node_weight[1] * g[1][r + 1];
+    const double a2 = h * node_weight[2] * g[2][r], b2 = h * node_weight[2] * g[2][r + 1];
+    const double a3 = h * node_weight[3] * g[3][r], b3 = h * node_weight[3] * g[3][r + 1];
+    const double a4 = h * node_weight[4] * g[4][r], b4 = h * node_weight[4] * g[4][r + 1];
+    const double a5 = h * node_weight[5] * g[5][r], b5 = h * node_weight[5] * g[5][r + 1];
+    const double a6 = h * node_weight[6] * g[6][r], b6 = h * node_weight[6] * g[6][r + 1];
+    const double a7 = h * node_weight[7] * g[7][r], b7 = h * node_weight[7] * g[7][r + 1];
+    for (c = of[3] > r / LANES * LANES ? of[3] : r / LANES * LANES; c < of[4]; c += LANES)
+      for (j = c; j < c + LANES; ++j) {
+        first[j] += a0 * g[0][j] + a1 * g[1][j] + a2 * g[2][j] + a3 * g[3][j] + a4 * g[4][j] + a5 * g[5][j] + a6 * g[6][j] + a7 * g[7][j];
+        second[j] += b0 * g[0][j] + b1 * g[1][j] + b2 * g[2][j] + b3 * g[3][j] + b4 * g[4][j] + b5 * g[5][j] + b6 * g[6][j] + b7 * g[7][j];
+      }
   }
 }
+
+/* States of the rows of each kind of block, and the row of each state in the block of its own column */
+static const int row_0[31] = { 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29, 30 };
+static const int own_row[STATES] = { 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29, 30 };
 
 /* ---- A segment: transition, Gramians, forced response ---- */
 
 typedef struct {
   double transposed[STATES][COLUMNS]; /* Phi' */
-  double W[SOURCES_1][STATES][COLUMNS];
+  double W[SOURCES_1][COLUMNS][COLUMNS];
   double z[COLUMNS];
   double error[COLUMNS];
 } Segment;
 
 /* How errors are weighed: see weigh */
 typedef struct {
-  double column[BLOCKS][STATES * LANES];
+  double column[BLOCKS][ROWS * LANES];
   double gain[SOURCES + 1][COLUMNS];
 } Weights;
 
@@ -2949,7 +2974,7 @@ typedef struct { double time, entry; } Failure;
 
 static int sweep_segment(Flight *f, double begin, double end, double tolerance, double most, const Weights *w, double *first,
                          Segment *g, Counters *count, Failure *failure, const volatile int *stop) {
-  double x[BLOCKS][STATES * LANES];
+  double x[BLOCKS][ROWS * LANES];
   Matrices m;
   Step s;
   const double least = larger(1e-10 * (end - begin), 1e-15 * (fabs(begin) + fabs(end)));
@@ -2957,7 +2982,7 @@ static int sweep_segment(Flight *f, double begin, double end, double tolerance, 
   int i, j, b;
   memset(x, 0, sizeof x);
   memset(g, 0, sizeof *g);
-  for (i = 0; i < STATES; ++i) x[i / LANES][i * LANES + i % LANES] = 1.0;
+  for (i = 0; i < STATES; ++i) x[i / LANES][own_row[i] * LANES + i % LANES] = 1.0;
   while (t > begin) {
     const double pieces = larger(1.0, ceil((t - begin) / step * (1.0 - 1e-12)));
     const double h = (t - begin) / pieces;
@@ -2967,12 +2992,12 @@ static int sweep_segment(Flight *f, double begin, double end, double tolerance, 
     if ((pieces > 1.0 && h < least) || many) {
       failure->time = t;
       for (b = 0; b < BLOCKS; ++b)
-        for (i = 0; i < STATES * LANES; ++i)
+        for (i = 0; i < ROWS * LANES; ++i)
           if (fabs(x[b][i] * w->column[b][i]) > 1e8) return OUT_OF_RANGE;
       return many ? TOO_MANY_STEPS : TOO_SMALL_A_STEP;
     }
     evaluate_stages(f, t, -h, &m);
-    for (b = 0; b < BLOCKS; ++b) step_block(&m, h, x[b], w->column[b], &s, b);
+    for (b = 0; b < 4; ++b) step_block_0(&m, h, x[b], w->column[b], &s, b);
     add_quadrature_errors(h, (const double (*)[COLUMNS])w->gain, &s);
     for (j = 0; j < COLUMNS && !isnan(error); ++j) if (!(s.error[j] <= error)) error = s.error[j];
     count->evaluations += STAGES;
@@ -2998,48 +3023,77 @@ static int sweep_segment(Flight *f, double begin, double end, double tolerance, 
     step = h * factor;
     t = pieces > 1.0 ? t - h : begin;
     memcpy(x, s.next, sizeof x);
-    for (i = 0; i < NOISES; ++i) add_products((const double (*)[COLUMNS])s.noise[i], h, g->W[noise_source[i]]);
+    for (i = 0; i < PRODUCTS; ++i)
+      add_products((const double (*)[COLUMNS])s.noise[product[i][0]], h, g->W[noise_source[product[i][0]]], product[i]);
     for (j = 0; j < COLUMNS; ++j) {
       for (i = 0; i < NODES; ++i) g->z[j] += h * node_weight[i] * s.known[i][j];
       g->error[j] += s.remaining[j];
     }
   }
-  for (i = 0; i < STATES; ++i)
-    for (j = 0; j < COLUMNS; ++j) g->transposed[i][j] = x[j / LANES][i * LANES + j % LANES];
+  for (i = 0; i < 31; ++i)
+    for (j = 0 * LANES; j < 4 * LANES; ++j) g->transposed[row_0[i]][j] = x[j / LANES][i * LANES + j % LANES];
   for (b = 0; b < SOURCES; ++b)
-    for (i = 0; i < STATES; ++i)
+    for (i = 0; i < COLUMNS; ++i)
       for (j = 0; j < i; ++j) g->W[b][i][j] = g->W[b][j][i];
   return DONE;
 }
 
 /* ---- Forward over a segment ---- */
 
-/* result = factor' right, of which the first STATES rows are wanted */
-static void multiply(const double (*restrict factor)[COLUMNS], const double (*restrict right)[COLUMNS],
-                     double (*restrict result)[COLUMNS]) {
-  int i, j, c;
-  for (i = 0; i < STATES; ++i) {
-    double sum[COLUMNS] = { 0.0 };
-    for (j = 0; j < STATES; ++j)
-      for (c = 0; c < COLUMNS; ++c) sum[c] += factor[j][i] * right[j][c];
-    for (c = 0; c < COLUMNS; ++c) result[i][c] = sum[c];
+/* result = factor' from, over the rows of a kind, `width` columns from its first on */
+static void multiply_own_0(const double (*restrict factor)[COLUMNS], const int count,
+                          const double (*restrict from)[32], double (*restrict result)[COLUMNS]) {
+  int i, k, c;
+  for (i = 0; i < count; ++i) {
+    double sum[32] = { 0.0 };
+    for (k = 0; k < 31; ++k)
+      for (c = 0; c < 32; ++c) sum[c] += factor[k][i] * from[k][c];
+    for (c = 0; c < 32; ++c) result[i][0 + c] = sum[c];
   }
 }
 
-/* inherited = Phi P Phi' */
-static void carry(const Segment *restrict g, const double *restrict P, double (*restrict inherited)[COLUMNS]) {
-  double padded[STATES][COLUMNS] = { { 0.0 } }, product[STATES][COLUMNS];
+/* result = factor' from, over the rows of a kind, `width` columns from its first on */
+static void multiply_upper_0(const double (*restrict factor)[COLUMNS], const int count,
+                          const double (*restrict from)[32], double (*restrict result)[COLUMNS]) {
+  int i, k, c;
+  for (i = 0; i < count; ++i) {
+    double sum[32] = { 0.0 };
+    for (k = 0; k < 31; ++k)
+      for (c = 0; c < 32; ++c) sum[c] += factor[k][i] * from[k][c];
+    for (c = 0; c < 32; ++c) result[i][0 + c] = sum[c];
+  }
+}
+
+/* inherited = Phi P Phi', both over states; P is symmetric. What is multiplied is gathered before. */
+static void carry(const Segment *restrict g, const double *restrict P, double (*restrict inherited)[STATES]) {
+  double factor[ROWS][COLUMNS] = { { 0.0 } }, right[STATES][COLUMNS], result[COLUMNS][COLUMNS];
   int i;
-  for (i = 0; i < STATES; ++i) memcpy(padded[i], P + i * STATES, STATES * sizeof(double));
-  multiply((const double (*)[COLUMNS])padded, g->transposed, product); /* P is symmetric */
-  multiply(g->transposed, (const double (*)[COLUMNS])product, inherited);
+  {
+    double phi[31][32];
+    for (i = 0; i < 31; ++i) {
+      memcpy(factor[i], P + row_0[i] * STATES, STATES * sizeof(double));
+      memcpy(phi[i], g->transposed[row_0[i]] + 0, sizeof phi[i]);
+    }
+    multiply_own_0((const double (*)[COLUMNS])factor, STATES, (const double (*)[32])phi, right);
+  }
+  {
+    double from[31][32];
+    for (i = 0; i < 31; ++i) {
+      memcpy(factor[i], g->transposed[row_0[i]] + 0, 4 * LANES * sizeof(double));
+      memcpy(from[i], right[row_0[i]] + 0, sizeof from[i]);
+    }
+    multiply_upper_0((const double (*)[COLUMNS])factor, 31, (const double (*)[32])from, result + 0);
+  }
+  for (i = 0; i < STATES; ++i) memcpy(inherited[i], result[i], STATES * sizeof(double));
 }
 
 /* Weigh the errors of the adjoint of state r by typical sizes alone. */
 static void weigh_by_size(const double *size, int r, Weights *w) {
+  const int c = r, b = c / LANES;
   int s, j;
-  for (j = 0; j < STATES; ++j) w->column[r / LANES][j * LANES + r % LANES] = size[j] / size[r];
-  for (s = 0; s <= SOURCES; ++s) w->gain[s][r] = 1.0 / size[r];
+  if (b >= 0 && b < 4)
+    for (j = 0; j < 31; ++j) w->column[b][j * LANES + c % LANES] = size[row_0[j]] / size[r];
+  for (s = 0; s <= SOURCES; ++s) w->gain[s][c] = 1.0 / size[r];
 }
 
 /* w->column[j][r]: what a unit error of the adjoint of state r in place j means for a response, now or later, relative to
@@ -3051,9 +3105,11 @@ static void weigh_by_size(const double *size, int r, Weights *w) {
 static void weigh(const double *C, const Segment *restrict g, const double *P, const double *covariance,
                   const double *m, const double *mean, const double *typical, Weights *w) {
   static const double unit[RESPONSES] = { 0.0 };
-  double effect[HORIZON * RESPONSES][COLUMNS], column[STATES], y[RESPONSES], size[STATES], all[STATES + RESPONSES];
+  double effect[HORIZON * RESPONSES][COLUMNS], column[STATES], y[RESPONSES], size[STATES], by_column[COLUMNS] = { 0.0 };
+  double phi[COLUMNS][COLUMNS], all[STATES + RESPONSES];
   int s, b, i, j, r;
   memset(effect, 0, sizeof effect);
+  memset(phi, 0, sizeof phi);
   memset(w, 0, sizeof *w);
   memset(column, 0, sizeof column);
   for (r = 0; r < STATES; ++r) {
@@ -3062,19 +3118,21 @@ static void weigh(const double *C, const Segment *restrict g, const double *P, c
     for (i = 0; i < RESPONSES; ++i) effect[i][r] = y[i];
     column[r] = 0.0;
   }
-  for (i = RESPONSES; i < HORIZON * RESPONSES; ++i)
-    for (j = 0; j < STATES; ++j) {
-      double sum = 0.0;
-      for (r = 0; r < COLUMNS; ++r) sum += effect[i - RESPONSES][r] * g->transposed[j][r];
-      effect[i][j] = sum;
-    }
+  for (r = 0; r < COLUMNS; ++r)
+    for (j = 0; j < STATES; ++j) phi[r][j] = g->transposed[j][r];
+  for (i = RESPONSES; i < HORIZON * RESPONSES; ++i) {
+    double sum[COLUMNS] = { 0.0 };
+    for (r = 0; r < COLUMNS; ++r)
+      for (j = 0; j < COLUMNS; ++j) sum[j] += effect[i - RESPONSES][r] * phi[r][j];
+    for (j = 0; j < COLUMNS; ++j) effect[i][j] = sum[j];
+  }
   for (r = 0; r < STATES; ++r) all[r] = fabs(m[r]);
   for (i = 0; i < RESPONSES; ++i) all[STATES + i] = fabs(mean[i]);
   for (s = 0; s <= SOURCES; ++s) {
     double *factor = w->gain[s], deviation[RESPONSES];
     for (r = 0; r < STATES; ++r) {
       const double variance = s < SOURCES ? P[(s * STATES + r) * STATES + r] : all[r] * all[r];
-      size[r] = variance > 0.0 ? sqrt(variance) : 0.0;
+      by_column[r] = size[r] = variance > 0.0 ? sqrt(variance) : 0.0;
       all[r] = larger(all[r], size[r]);
       factor[r] = size[r] > 0.0 ? 0.01 / larger(size[r], SMALLEST * typical[r]) : 0.0;
     }
@@ -3086,19 +3144,25 @@ static void weigh(const double *C, const Segment *restrict g, const double *P, c
     for (i = 0; i < HORIZON * RESPONSES; ++i) {
       const double least = SMALLEST * typical[STATES + i % RESPONSES];
       double now = 0.0, then = 0.0, inverse;
-      for (r = 0; r < STATES; ++r) {
-        now = larger(now, fabs(effect[i % RESPONSES][r]) * size[r]);
-        then = larger(then, fabs(effect[i][r]) * size[r]);
+      double nows[LANES] = { 0.0 }, thens[LANES] = { 0.0 };
+      for (r = 0; r < COLUMNS; r += LANES)
+        for (j = 0; j < LANES; ++j) {
+          nows[j] = larger(nows[j], fabs(effect[i % RESPONSES][r + j]) * by_column[r + j]);
+          thens[j] = larger(thens[j], fabs(effect[i][r + j]) * by_column[r + j]);
+        }
+      for (j = 0; j < LANES; ++j) {
+        now = larger(now, nows[j]);
+        then = larger(then, thens[j]);
       }
       /* where a system grows, so does the response that errors are held against */
       inverse = deviation[i % RESPONSES] > 0.0 ? 1.0 / larger(deviation[i % RESPONSES], least) : 0.0;
       if (then > now) inverse *= now / then;
       for (r = 0; r < COLUMNS; ++r) factor[r] = larger(factor[r], fabs(effect[i][r]) * inverse);
     }
-    for (b = 0; b < BLOCKS && s < SOURCES; ++b)
-      for (j = 0; j < STATES; ++j)
+    for (b = 0; b < 4 && s < SOURCES; ++b)
+      for (j = 0; j < 31; ++j)
         for (r = 0; r < LANES; ++r)
-          w->column[b][j * LANES + r] = larger(w->column[b][j * LANES + r], size[j] * factor[b * LANES + r]);
+          w->column[b][j * LANES + r] = larger(w->column[b][j * LANES + r], size[row_0[j]] * factor[b * LANES + r]);
   }
   /* what no noise reaches is weighed by typical sizes, for the mean */
   for (r = 0; r < STATES; ++r) {
@@ -3122,12 +3186,12 @@ static void carry_mean(const Segment *restrict g, const double *restrict m, doub
   }
 }
 
-static void covariance_of(const double *C, const double *P, int stride, double *result) {
+static void covariance_of(const double *C, const double *P, double *result) {
   static const double none[RESPONSES] = { 0.0 };
   double half[STATES][RESPONSES];
   double column[STATES];
   int i, r;
-  for (i = 0; i < STATES; ++i) respond(C, none, P + i * stride, half[i]);
+  for (i = 0; i < STATES; ++i) respond(C, none, P + i * STATES, half[i]);
   for (r = 0; r < RESPONSES; ++r) {
     for (i = 0; i < STATES; ++i) column[i] = half[i][r];
     respond(C, none, column, result + r * RESPONSES);
@@ -3137,16 +3201,16 @@ static void covariance_of(const double *C, const double *P, int stride, double *
 /* P_next = Phi P Phi' + W and the covariance of the responses, with the part of each variance that P brought */
 static void forward(const Segment *restrict g, const double *C, const double *P, double *P_next, double *covariance,
                     double *inherited) {
-  double carried[STATES][COLUMNS], part[RESPONSES * RESPONSES];
+  double carried[STATES][STATES], part[RESPONSES * RESPONSES];
   int s, i, j;
   for (s = 0; s < SOURCES; ++s) {
     double *next = P_next + s * STATES * STATES;
     carry(g, P + s * STATES * STATES, carried);
-    covariance_of(C, &carried[0][0], COLUMNS, part);
+    covariance_of(C, &carried[0][0], part);
     for (i = 0; i < RESPONSES; ++i) inherited[s * RESPONSES + i] = part[i * RESPONSES + i];
     for (i = 0; i < STATES; ++i)
       for (j = 0; j < STATES; ++j) next[i * STATES + j] = carried[i][j] + g->W[s][i][j];
-    covariance_of(C, next, STATES, covariance + s * RESPONSES * RESPONSES);
+    covariance_of(C, next, covariance + s * RESPONSES * RESPONSES);
   }
 }
 
@@ -3224,7 +3288,7 @@ EXPORT int sweep(int count, double start, const double *end, const double *low, 
     }
     forward(&g, C, P, P_next, result, inherited);
     memcpy(P, P_next, SOURCES * STATES * STATES * sizeof(double));
-    for (j = 0; j < STATES; ++j) made = larger(j ? made : 0.0, g.error[j]);
+    for (j = 0; j < COLUMNS; ++j) made = larger(j ? made : 0.0, g.error[j]);
     for (s = 0; s < SOURCES; ++s) {
       double worst = 0.0;
       for (r = 0; r < RESPONSES; ++r) {
@@ -3247,7 +3311,8 @@ EXPORT int sweep(int count, double start, const double *end, const double *low, 
         for (j = 0; j < STATES; ++j) transition[(k * STATES + i) * STATES + j] = g.transposed[j][i];
     if (added)
       for (s = 0; s < SOURCES; ++s)
-        for (i = 0; i < STATES; ++i) memcpy(added + ((k * SOURCES + s) * STATES + i) * STATES, g.W[s][i], STATES * sizeof(double));
+        for (i = 0; i < STATES; ++i)
+          for (j = 0; j < STATES; ++j) added[((k * SOURCES + s) * STATES + i) * STATES + j] = g.W[s][i][j];
     if (length > 0.1 * longest) weigh(C, &g, P, result, m, mean + k * RESPONSES, size, &weights);
     longest = larger(longest, length);
   }
