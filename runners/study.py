@@ -38,6 +38,7 @@ from .measured_winds.wind_field import measured_persistence, wind_field
 from .sensitivity.check import check_sensitivity
 from .sensitivity.many import sensitivities
 from .sensitivity.one import sensitivity
+from .sensitivity.percentile import percentile_sensitivity
 from .sensitivity.second import second_derivatives
 from .solvers.adjoint import AdjointSolver, adjoint_member
 from .solvers.sweep import batch, interpreted_weighting, sweep
@@ -45,6 +46,7 @@ from .statistics.cvodes import Cvodes
 from .statistics.dataset import batch_dataset, with_members
 from .statistics.engine import Engine, Progress
 from .statistics.engines import engine_as, engine_of_options, find_engine, response_statistics
+from .statistics.norm import LIKE_3_SIGMA
 from .statistics.percentiles import Sides
 from .statistics.results import ResponseStatistics
 from .statistics.sweep import Sweep
@@ -389,6 +391,36 @@ class Study(Case):
             The vehicle has stations outside those of the table.
         """
         return limit_passage(self, limits, window, probability, sides, draws, seed)
+
+    def percentile_sensitivity(
+        self, resultant: str, time: float, probability: float = LIKE_3_SIGMA, parameters: Iterable[str] | None = None
+    ) -> xr.Dataset:
+        """Return the derivatives of a percentile of a resultant of both planes, by all parameters and tables.
+
+        Parameters
+        ----------
+        resultant : str
+            Such as 'resultant_bending_moment' or 'total_angle_of_attack'.
+        time : float
+            End time t2, s.
+        probability : float
+            With which the resultant exceeds its level at that instant; by default 1 - Phi(3).
+        parameters : iterable of str, optional
+            All without it.
+
+        Returns
+        -------
+        xarray.Dataset
+            As :meth:`sensitivity`. The attributes hold the level (``value``), its likeliest direction (rad, from pitch
+            towards yaw) and its derivatives by the mean vector and the covariance of both planes.
+
+        Raises
+        ------
+        PlanesError
+            The system has one plane.
+        UnknownNameError, TimeRangeError, ParameterValueError, DirectNoiseError, NoCompilerError, IntegrationError
+        """
+        return percentile_sensitivity(self, resultant, time, probability, parameters)
 
     def design_wind(
         self,

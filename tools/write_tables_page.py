@@ -15,8 +15,10 @@ SIGNS = {"+": "above 0", "0": "0 or above", "": ""}
 TABLES: tuple[tuple[str, Sequence[c.Column]], ...] = (
     ("`[tables.rigid_body]`", (c.TIME, *c.RIGID_BODY)),
     ("`[tables.trajectory]`", (c.TIME, *c.TRAJECTORY)),
+    ("`[tables.trajectory]`, where its heading turns, for both planes", (c.AZIMUTH_CHANGE,)),
     ("`[tables.propulsion]`", (c.TIME, *c.PROPULSION)),
     ("`[tables.aerodynamics]`", (c.TIME, *c.AERODYNAMICS)),
+    ("`[tables.aerodynamics]`, of a plane that is not symmetrical", (c.ZERO_ANGLE,)),
     ("`[control.gains]`", (c.TIME, *c.GAINS)),
     ("`[[bending]]`, a mode", (c.TIME, *c.bending_columns(["TANK"]))),
     ("`[[bending]]`, where a centre of pressure deviates", (c.MOVED_MODE,)),
@@ -35,6 +37,7 @@ TABLES: tuple[tuple[str, Sequence[c.Column]], ...] = (
     ("`[control.accelerometer.modes]`, `[control.angle_of_attack.modes]`", (c.TIME, *c.mode_columns(1))),
     ("`[control.accelerometer.schedule]`, `[control.angle_of_attack.schedule]`", (c.TIME, *c.SCHEDULE)),
     ("`[wind.statistics]`", (c.ALTITUDE, *c.WIND)),
+    ("`[wind.components.statistics]`, for both planes", (c.ALTITUDE, *c.WIND_COMPONENTS)),
     ("`[wind.turbulence.intensity]`", (c.ALTITUDE, *c.TURBULENCE)),
 )
 

@@ -56,7 +56,7 @@ def sensitivity(
             "not defined; pass elasticity=False for derivatives alone"
         )
     relative_to = value if elasticity else None
-    variables, coordinates = _parameter_sensitivities(case, gradient, rows, relative_to)
+    variables, coordinates = parameter_sensitivities(case, gradient, rows, relative_to)
     if any(g.kind == "given" for g in case.system.tables):
         total = total_density(case.with_means.groups, pair, gradient)
         start = start_share(case.vehicle, pair, factors[0]) if factors[0] else None
@@ -96,7 +96,8 @@ def refuse_undefined(system: LinearSystem, gradient: Gradient, rows: Iterable[in
             )
 
 
-def _parameter_sensitivities(case: Case, gradient: Gradient, rows: list[int], value: float | None) -> Parts:
+def parameter_sensitivities(case: Case, gradient: Gradient, rows: list[int], value: float | None) -> Parts:
+    """Return what a sensitivity says of parameters; elasticities are of ``value``, left out for None."""
     parameters = [case.system.parameters[i] for i in rows]
     numbers, derivative = case.executable.parameters[rows], gradient.parameters[rows]
     label = {RULE: "quantity parameter^-1", "long_name": "derivative"}

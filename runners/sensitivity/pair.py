@@ -67,21 +67,24 @@ class Combination:
 class AdjointPair:
     """Adjoint, its product with the covariance, and the mean, for one response, time and set of sources.
 
+    The response may be a linear form of several, such as the component of a moment along a direction in two planes.
+
     Parameters
     ----------
     flight : FlightNodes
         To ``time`` at least.
-    response : int
-        Row of C.
+    response : int or (n_y,) array
+        Row of C, or the weights of a linear form of them.
     time : float
         t2, s, one of those that the grid was made for; on a discontinuity it is seen from the left.
     sources : tuple of str
     """
 
-    def __init__(self, flight: FlightNodes, response: int, time: float, sources: tuple[str, ...]):
+    def __init__(self, flight: FlightNodes, response: int | NDArray[np.float64], time: float, sources: tuple[str, ...]):
         self.flight, self.executable = flight, flight.executable
         system, executable = self.executable.system, self.executable
-        self.response, self.time, self.sources = response, time, sources
+        whole = np.eye(len(system.outputs))[response] if isinstance(response, int | np.integer) else response
+        self.form, self.time, self.sources = np.asarray(whole, float), time, sources
         n, steps = len(system.states), int(np.argmin(np.abs(flight.grid.edges - time)))
         self.steps, self.node = steps, float(flight.grid.edges[steps])
         self.mask = np.array([float(noise.source in sources) for noise in system.noises])
@@ -94,7 +97,7 @@ class AdjointPair:
         self.at_end = executable.matrices(self.node, last.low, last.high)
 
         still = np.zeros((steps, STAGES, n))
-        stages, edges = flight.solver.backward(self.at_end["C"][response], still)
+        stages, edges = flight.solver.backward(self.form @ self.at_end["C"], still)
         self.adjoint, self.adjoint_at_start, self.adjoint_at_edges = stages.reshape(-1, n), edges[0], edges
         B = self.matrices["B"]
         white = self.mask * B.transposed_times(self.adjoint)
@@ -105,7 +108,7 @@ class AdjointPair:
         self.variance = float(self.weights @ np.sum(white**2, axis=1) + self.adjoint_at_start @ start)
         self.states, self.states_at_end = flight.mean[0][:steps].reshape(-1, n), flight.mean[1][steps]
         self.mean = float(
-            self.at_end["C"][response] @ self.states_at_end + self.at_end["G"][response] @ self.at_end["inputs"][:, 0]
+            self.form @ (self.at_end["C"] @ self.states_at_end + self.at_end["G"] @ self.at_end["inputs"][:, 0])
         )
 
     @cached_property
@@ -118,15 +121,15 @@ class AdjointPair:
         step = min(step, 0.5 * (high - low))
         middle = min(max(at, low + step), high - step)
         three = [self.executable.matrices(t, low, high) for t in (middle - step, middle, middle + step)]
-        i, m = self.response, self.at_end
-        C, u = m["C"][i], m["inputs"][:, 0]
+        form, m = self.form, self.at_end
+        C, u = form @ m["C"], m["inputs"][:, 0]
 
         def rate(first: Any, second: Any, third: Any) -> Any:
             """Of the parabola through three values, at ``at``."""
             return ((third - first) / 2 + (at - middle) / step * (third - 2 * second + first)) / step
 
-        C_rate = rate(*(n["C"][i] for n in three)) + C @ m["A"]
-        direct = rate(*(n["G"][i] @ n["inputs"][:, 0] for n in three))
+        C_rate = rate(*(form @ n["C"] for n in three)) + C @ m["A"]
+        direct = rate(*(form @ n["G"] @ n["inputs"][:, 0] for n in three))
         variance = 2 * C_rate @ self.dual_at_end + float(np.sum(self.mask * (C @ m["B"]) ** 2))
         mean = C_rate @ self.states_at_end + C @ m["E"] @ u + direct
         return float(variance), float(mean)
@@ -136,7 +139,7 @@ class AdjointPair:
         functions, n, r = self.flight.functions, self.adjoint.shape[1], self.at_end["C"].shape[0]
         at = (self.weights, self.times, self.tables, self.flight.numbers)
         at_end = (np.ones(1), np.array([self.end]), self.tables_at_end[None], self.flight.numbers)
-        selected, still = np.eye(r)[self.response], np.zeros((1, n))
+        selected, still = self.form, np.zeros((1, n))
         numbers, along = np.zeros(self.flight.numbers.size), np.zeros_like(self.tables)
         last, adjoint = np.zeros(self.tables.shape[1]), mean_factor * self.adjoint
         on_outputs, on_outputs_end = np.zeros((self.times.size, r)), mean_factor * selected

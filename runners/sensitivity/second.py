@@ -200,7 +200,7 @@ def _column(pair: AdjointPair, combined: Combination, factors: tuple[float, floa
     # the adjoint, and its product with the covariance
     a, y, m = pair.adjoint, pair.dual, pair.matrices
     forcing = d["A"].transposed_times(a).reshape(-1, STAGES, n)
-    stages, edges = flight.solver.backward(d_end["C"].dense[0, pair.response], forcing)
+    stages, edges = flight.solver.backward(pair.form @ d_end["C"].dense[0], forcing)
     da, da_start = stages.reshape(-1, n), edges[0]
     white = pair.mask * m["B"].transposed_times(a)
     d_white = pair.mask * (d["B"].transposed_times(a) + m["B"].transposed_times(da))
@@ -212,7 +212,7 @@ def _column(pair: AdjointPair, combined: Combination, factors: tuple[float, floa
 
     # the gradients of both forms
     on_variance, on_mean = factors
-    selected, still, none = np.eye(r)[pair.response], np.zeros((1, n)), np.zeros(r)
+    selected, still, none = pair.form, np.zeros((1, n)), np.zeros(r)
     unmoved = [none, np.zeros_like(pair.mask)]
     along = on_variance * nodes.form_tangent(
         expressions.quadratic, [a, y, none, pair.mask], numbers, d_tables, [da, dy, *unmoved]

@@ -132,7 +132,7 @@ class _Sides:
             )
             values.append(float(sum(parts)))
             size += float(sum(abs(part) for part in parts))
-            outputs.append(np.append(m["C"][pair.response], m["G"][pair.response] @ u))
+            outputs.append(np.append(pair.form @ m["C"], pair.form @ m["G"] @ u))
         difference = values[0] - values[1]
         self.jump = 0.0 if abs(difference) <= NOTHING * size else difference
         self.same_outputs = bool(np.abs(outputs[0] - outputs[1]).max() <= NOTHING * np.abs(outputs).max())
