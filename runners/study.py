@@ -404,7 +404,7 @@ class Study(Case):
         time : float
             End time t2, s.
         probability : float
-            With which the resultant exceeds its level at that instant; by default 1 - Phi(3).
+            Probability with which the resultant exceeds its level at that instant; by default 1 - Phi(3).
         parameters : iterable of str, optional
             All without it.
 
