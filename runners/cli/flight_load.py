@@ -43,6 +43,10 @@ def flight_load(
     sensitivity: Annotated[
         bool, typer.Option("--sensitivity", help="Derivatives of the first level by parameters, ranked.")
     ] = False,
+    wind_error: Annotated[
+        float | None,
+        typer.Option(parser=number, help="Relative spread of the wind's sigma from flight to flight, e.g. 0.08."),
+    ] = None,
     draws: Annotated[int, typer.Option(parser=whole, help="Paths of the importance sampling.")] = 2000,
     seed: Annotated[int, typer.Option(parser=whole, help="Of the draws.")] = 0,
     out: Annotated[Path | None, typer.Option(help="Folder for results; VEHICLE-flight-load without it.")] = None,
@@ -58,6 +62,7 @@ def flight_load(
     from ..flight_load.load import DESIGN
     from ..flight_load.margin_figure import margin_figure
     from ..flight_load.request import NoVarianceError, checked_draws
+    from ..flight_load.uncertain_parameter import checked_spread
     from ..flight_load.window import checked_window
     from ..present.style import words, write_figure
     from ..statistics.percentiles import checked_probabilities, checked_sides
@@ -66,6 +71,8 @@ def flight_load(
     flown = None if window is None else parse_window(window)
     limits = None if limit is None else Limits.read(limit)
     checked_draws(draws, seed)
+    if wind_error is not None:
+        checked_spread(wind_error)
     study = load_study(
         vehicle, changes, ["title", "default_times"] if window is None else ["title"], turbulence=turbulence
     )
@@ -112,6 +119,8 @@ def flight_load(
                 job.written += write_figure(margin_figure(load, heading), job.folder, f"limit_{load.response}")
             bar.done()
     print_loads(loads)
+    if wind_error is not None:
+        _print_uncertain(loads, wind_error)
     if passage is not None:
         print_passage(passage)
     if sensitivity:
@@ -209,6 +218,27 @@ def _sensitivities(loads: list[FlightLoad]) -> list[xr.Dataset]:
                 errors.print(text, style="bold red", markup=False, highlight=False, soft_wrap=True)
             bar.done(words(load.response))
     return found
+
+
+def _print_uncertain(loads: list[FlightLoad], wind_error: float) -> None:
+    """Print the levels of flights of which each has its own sigma of the wind."""
+    from ..present.style import display, words
+
+    table = Table(
+        "response", title=f"Levels with the wind's σ uncertain by {100 * wind_error:.3g} % from flight to flight"
+    )
+    for column in ("chance", "level", "± 95 %", "against one σ"):
+        table.add_column(column, justify="right", no_wrap=True)
+    with steps("levels with an uncertain wind", len(loads)) as bar:
+        for load in loads:
+            found = load.level_with_uncertain(spread=wind_error)
+            for k, p in enumerate(load.probabilities):
+                factor, unit = display(load.unit, float(found[k]))
+                half = f"{1.96 * factor * found.attrs['standard_error'][k]:.2g}"
+                more = f"{100 * (float(found[k]) / load.levels[k].value - 1):+.2g} %"
+                table.add_row(words(load.response), f"{p:g}", f"{factor * float(found[k]):.4g} {unit}", half, more)
+            bar.done(words(load.response))
+    console.print(table)
 
 
 def print_sensitivity(found: xr.Dataset) -> None:

@@ -33,6 +33,7 @@ from .request import SpacingWarning, checked_draws, checked_level, refuse_withou
 from .response import ResponseInWindow
 from .sampling import draw_beyond
 from .sensitivity import level_sensitivity
+from .uncertain_parameter import checked_spread, uncertain_level
 from .upcrossings import upcrossing_rate
 from .wind_interval import wind_intervals
 from .window import checked_window
@@ -45,6 +46,7 @@ DRAWS = 2000
 MOVED = 8000  # draws of paths that just reach a level, of which derivatives are made
 BINS = 60  # of the time of the maximum
 SIDES = "upper", "lower"
+WIND_SIGMA = "wind.sigma_scale"
 RUNS = "simulated flights without a failure that would say as much, at a consumer's risk of 10 %"
 
 
@@ -181,6 +183,50 @@ class FlightLoad:
         found = wind_intervals(self.of, self.process, self.levels, number, confidence)
         name = f"{100 * confidence:g} % interval by {number:g} independent soundings of the wind"
         return self._array(found, name, ("bound",)).assign_attrs(independent_samples=number, confidence=confidence)
+
+    def level_with_uncertain(self, parameter: str = WIND_SIGMA, spread: float | None = None) -> xr.DataArray:
+        """Return the levels of flights of which a parameter is uncertain, a constant of each, (probability,).
+
+        The wind's sigma is known from N soundings only, to 1 / sqrt(2 (N - 1)) of itself, besides what its filter is
+        off: the load of a flight that is drawn with its own sigma has a longer tail than any of one sigma.
+
+        Parameters
+        ----------
+        parameter : str
+            One of the case.
+        spread : float, optional
+            Relative standard deviation of its normal law; that of the wind's sigma by the soundings of the wind's
+            record without it.
+
+        Returns
+        -------
+        xarray.DataArray
+            In the unit of the response; attributes ``parameter``, ``spread`` and ``standard_error``, by the sampling.
+
+        Raises
+        ------
+        UnknownNameError
+            There is no such parameter.
+        ParameterValueError
+            No spread is given or known, it is none, or the parameter is 0.
+        """
+        if spread is None:
+            if parameter != WIND_SIGMA:
+                raise ParameterValueError(
+                    f"the spread of '{parameter}' is not known; give a relative one, such as 0.05"
+                )
+            spread = float(1 / np.sqrt(2 * (checked_samples(None, self.wind_samples) - 1)))
+        asked = checked_spread(spread)
+        found = [
+            uncertain_level(
+                self.of, level, p, self.sides, parameter, asked, self._random(6, k), max(200, self.draws // 4)
+            )
+            for k, (p, level) in enumerate(zip(self.probabilities, self.levels, strict=True))
+        ]
+        name = f"level that flights pass with {parameter} uncertain by {100 * asked:.3g} %"
+        return self._array([value for value, _ in found], name).assign_attrs(
+            parameter=parameter, spread=asked, standard_error=[error for _, error in found]
+        )
 
     def monte_carlo_runs(self, probability: float | None = None, risk: float = 0.10, failures: int = 0) -> int:
         """Return the number of simulated flights that would say as much of a level.

@@ -79,8 +79,8 @@ UNUSED = [
 KNOWN = {
     "run": {"times", "out", "engine", "method", "tolerance", "turbulence", "changes", "along_vehicle", "probability"},
     "flight-load": {
-        "window", "response", "probability", "limit", "sides", "sensitivity", "draws", "seed", "out", "turbulence",
-        "changes",
+        "window", "response", "probability", "limit", "sides", "sensitivity", "wind_error", "draws", "seed", "out",
+        "turbulence", "changes",
     },
     "gust": {"shape", "response", "amplitude", "length", "times", "out", "turbulence", "changes"},
     "fly": {"times", "response", "levels", "component", "sign", "out", "changes"},

@@ -185,6 +185,8 @@ def test_limits_that_the_vehicle_has_not(refused, tmp_path, text, why):
         (["--probability", "much"], "much"),
         (["--sides", "bth"], "did you mean 'both'"),
         (["--draws", "5"], "draws = 5"),
+        (["--wind-error", "-0.1"], "a spread of -0.1 is none"),
+        (["--wind-error", "0.5"], "would change the sign"),
         (["--draws", "1.5"], "1.5"),
         (["--seed", "-1"], "seed = -1"),
         (["--response", "bending_momnet"], "did you mean 'bending_moment'"),
