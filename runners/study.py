@@ -46,6 +46,7 @@ from .statistics.cvodes import Cvodes
 from .statistics.dataset import batch_dataset, with_members
 from .statistics.engine import Engine, Progress
 from .statistics.engines import engine_as, engine_of_options, find_engine, response_statistics
+from .statistics.exact_penetration import check_gust_penetration
 from .statistics.norm import LIKE_3_SIGMA
 from .statistics.percentiles import Sides
 from .statistics.results import ResponseStatistics
@@ -838,6 +839,25 @@ class Study(Case):
         """
         self.require_linear_mean("a second derivative")
         return second_derivatives(self, response, time, parameters, source, quantity)
+
+    def check_gust_penetration(self, time: float) -> xr.Dataset:
+        """Return sigma by the wind's sources with the equations' rational delays and with exact ones.
+
+        Parameters
+        ----------
+        time : float
+            t2, s.
+
+        Returns
+        -------
+        xarray.Dataset
+            ``rational`` and ``exact`` over (response, source), ``difference`` and ``agrees`` (within 1 %) by response.
+
+        Raises
+        ------
+        DataError, NoVehicleError, TimeRangeError, IntegrationError
+        """
+        return check_gust_penetration(self, time)
 
     def check_sensitivity(
         self,

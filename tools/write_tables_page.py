@@ -34,6 +34,7 @@ TABLES: tuple[tuple[str, Sequence[c.Column]], ...] = (
     ("`[tables.loads_along_vehicle]`, besides the columns of all `[[loads]]`", c.ALONG_ARGUMENTS),
     ("`[tables.shear_along_vehicle]`, besides the columns of all `[loads.shear]`", c.ALONG_ARGUMENTS),
     ("`[tables.axial_along_vehicle]`, besides the columns of all `[loads.axial]`", (*c.ALONG_ARGUMENTS, c.RADIUS)),
+    ("`[tables.normal_force_along_vehicle]`", (*c.ALONG_ARGUMENTS, *c.normal_force_columns(1))),
     ("`[control.accelerometer.modes]`, `[control.angle_of_attack.modes]`", (c.TIME, *c.mode_columns(1))),
     ("`[control.accelerometer.schedule]`, `[control.angle_of_attack.schedule]`", (c.TIME, *c.SCHEDULE)),
     ("`[wind.statistics]`", (c.ALTITUDE, *c.WIND)),

@@ -20,6 +20,7 @@ from .plane import PlaneEquations, Winds, plane_equations
 from .structure import structure_in_words
 from .turbulence import start_covariance, turbulence_block
 from .vehicle_numbers import Numbers, Shared
+from .vehicle_tables import met_altitude_name
 from .wind import WindBlock, wind_block
 
 
@@ -107,7 +108,7 @@ def _outputs(parts: Sequence[PlaneEquations]) -> tuple[tuple[Output, ...], ca.SX
 def _winds(vehicle: Vehicle, numbers: Sequence[Numbers]) -> dict[str, WindBlock]:
     """Return what is random in the wind that is met, by source; turbulence has a wind of its own for each plane."""
     one = numbers[0]
-    rate = one.tables["altitude_rate"]
+    rate = one.tables[f"{met_altitude_name(vehicle)}_rate"]
     found = {WIND: wind_block(vehicle.wind, one.tables, rate, one.sigma_scale)}
     if vehicle.turbulence and one.turbulence:
         driver = found[WIND].white[0]

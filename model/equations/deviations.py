@@ -26,8 +26,8 @@ class Undeviated:
     Attributes
     ----------
     states, rates, outputs : SX columns
-    angles : (2,) SX
-        Angle of attack and engine angle in terms of the states.
+    angles : (2 + zones,) SX
+        Angle of attack, engine angle and those of gust zones in terms of the states.
     responses : tuple of str
         Names of the outputs.
     handles : Handles
@@ -57,7 +57,7 @@ def deviated(vehicle: Vehicle, numbers: Numbers, motion: Motion, equations: Unde
         rates += column[:n] * deviation
         outputs += column[n:] * deviation
     handles = equations.handles
-    symbols = ca.vertcat(motion.alpha, motion.beta, handles.vector)
+    symbols = ca.vertcat(motion.alpha, motion.beta, motion.zone_angles, handles.vector)
     rates, outputs = ca.substitute(
         [rates, outputs], [symbols], [ca.vertcat(equations.angles, handles.values(numbers.tables))]
     )
@@ -105,9 +105,9 @@ def deviation_column(
             column += ca.jtimes(both, handles.moved, symbol)
     if column.is_zero():
         raise _refusal(vehicle, name, f"deviations of {', '.join(deviating)} change nothing in the equations")
-    at_mean = ca.vertcat(*(tables[n] for n in MEAN_TABLES), 0, 0, 1)
+    at_mean = ca.vertcat(*(tables[n] for n in MEAN_TABLES), 0, 0, 1, ca.SX.zeros(motion.zone_angles.numel()))
     angles = motion.alpha, motion.beta, motion.attitude
-    symbols = ca.vertcat(*angles, handles.moved, handles.couple, numbers.undisturbed)
+    symbols = ca.vertcat(*angles, handles.moved, handles.couple, numbers.undisturbed, motion.zone_angles)
     column = ca.substitute(column, symbols, at_mean)
     if ca.depends_on(column, equations.states):
         raise _refusal(

@@ -16,6 +16,7 @@ from .coupling import Accelerations, accelerations
 from .local_aerodynamics import local_forces
 from .motion import Motion
 from .noise_loads import moved_modal_force
+from .penetration import zone_forces
 from .vehicle_numbers import Numbers
 
 
@@ -86,6 +87,9 @@ def solved_motion(vehicle: Vehicle, numbers: Numbers, motion: Motion, handles: H
     if options.local_angle_of_attack:
         local = local_forces(tables, area, motion.attitude_rate, eta, eta_rate)
         force, moment, modal_force = force + local.force, moment + local.moment, modal_force + local.modal
+    if motion.zone_angles.numel():
+        zones = zone_forces(tables, area, motion.zone_angles, modes)
+        moment, modal_force = moment + zones.moment, modal_force + zones.modal
     return accelerations(
         mass=tables["mass"],
         inertia=tables["moment_of_inertia"],

@@ -16,15 +16,18 @@ from .typical_sizes import SCALES
 IN_PLACE_UNITS = {CENTER_OF_GRAVITY_OFFSET: ("m", "offset"), THRUST_MISALIGNMENT: ("rad", "angle")}
 
 
-def component_columns(modes: int, tanks: Sequence[str], deviations: Iterable[str] = ()) -> dict[str, str]:
+def component_columns(
+    modes: int, tanks: Sequence[str], deviations: Iterable[str] = (), zones: int = 1
+) -> dict[str, str]:
     """Return the outputs that a moment is made of and the column of a load's table that multiplies each.
 
     The columns of slosh_reaction have no output of their own: they act through the tanks. ``deviations`` are those that
-    load stations by themselves.
+    load stations by themselves, ``zones`` the number of gust zones.
     """
     numbers = range(1, modes + 1)
     return {
         "angle_of_attack": "angle_of_attack",
+        **{f"zone_angle_{j}": f"zone_angle_{j}" for j in range(1, zones + 1) if zones > 1},
         "engine_angle": "engine_angle",
         **{f"bending_acceleration_{i}": f"bending_{i}" for i in numbers},
         **{f"slosh_acceleration_{tank}": f"slosh_{tank}" for tank in tanks},
@@ -41,6 +44,9 @@ def load_components(
 ) -> list[tuple[Output, ca.SX]]:
     """Return those of them that are no outputs anyway."""
     found = [(Output("attitude_rate", "rad/s", SCALES["angle"], "phi'"), motion.attitude_rate)]
+    for j in range(motion.zone_angles.numel()):
+        what = f"of gust zone {j + 1}, less alpha"
+        found.append((Output(f"zone_angle_{j + 1}", "rad", SCALES["angle"], what), motion.zone_angles[j]))
     for i in range(motion.eta.numel()):
         n = i + 1
         found += [

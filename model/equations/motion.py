@@ -22,6 +22,8 @@ class Motion:
         Slosh relative to the tank (m), m/s.
     alpha, beta : SX
         Angle of attack and engine angle (rad). What 4-3 and 4-4 say of them is put in their place last.
+    zone_angles : (zones,) SX
+        What each gust zone's wind adds to the angle of attack (rad), likewise; empty where all feel one wind.
     """
 
     lateral_position: ca.SX
@@ -34,9 +36,10 @@ class Motion:
     xi_rate: ca.SX
     alpha: ca.SX
     beta: ca.SX
+    zone_angles: ca.SX
 
     @staticmethod
-    def of(modes: int, tanks: Sequence[str]) -> Motion:
+    def of(modes: int, tanks: Sequence[str], zones: int = 1) -> Motion:
         """Declare the motion of a vehicle; every symbol carries its full name."""
         numbers = range(1, modes + 1)
         return Motion(
@@ -47,6 +50,7 @@ class Motion:
             xi_rate=named(f"slosh_rate_{tank}" for tank in tanks),
             alpha=ca.SX.sym("angle_of_attack"),
             beta=ca.SX.sym("engine_angle"),
+            zone_angles=named(f"zone_angle_{j}" for j in range(1, zones + 1) if zones > 1),
         )
 
 

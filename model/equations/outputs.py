@@ -26,6 +26,7 @@ from .loads import (
 )
 from .local_aerodynamics import local_load
 from .motion import Motion
+from .penetration import zone_load
 from .typical_sizes import SCALES
 from .vehicle_numbers import Numbers
 
@@ -82,6 +83,8 @@ def _lateral(
         value += slosh_reaction(tables, name, tanks, weights, motion.xi, solved.slosh)
     if options.p_delta:
         value += bent_axis_load(tables, name, handles.bent_thrust, motion.eta)
+    if motion.zone_angles.numel():
+        value += zone_load(tables, numbers.area, name, motion.zone_angles)
     scale = typical_load(vehicle.tables[f"loads.{name}.angle_of_attack"])
     what = "shear force" if load.is_shear else "B.M."
     return Output(name, load.unit, scale, f"{what} at station {load.station.station_m:g} m"), value

@@ -19,6 +19,7 @@ from .deviations import Undeviated, deviated
 from .forces import Handles, solved_motion
 from .motion import Motion
 from .outputs import outputs
+from .penetration import penetration
 from .typical_sizes import SCALES
 from .vehicle_numbers import Numbers
 
@@ -72,21 +73,21 @@ def plane_equations(plane: Plane, numbers: Numbers, turbulence: ca.SX, winds: Wi
         If a noise source deviates a table that the mean response cannot carry.
     """
     vehicle = plane.vehicle
-    motion, handles = Motion.of(numbers.modes, numbers.tanks), Handles.new()
+    motion, handles = Motion.of(numbers.modes, numbers.tanks, numbers.zones), Handles.new()
     solved = solved_motion(vehicle, numbers, motion, handles)
     control = control_law(numbers, motion, solved)
     met = [random + mean for random, mean in zip(winds.random, winds.mean, strict=True)]
     if WIND_BIAS in numbers.biases:
         deviation = numbers.biases[WIND_BIAS].deviation
         met = [wind + deviation * expected for wind, expected in zip(met, winds.expected, strict=True)]
-    alpha = rigid_body.angle_of_attack(
-        numbers.tables, motion.attitude, motion.lateral_velocity, in_plane(plane, numbers, met) + turbulence
-    )
+    zones = penetration(in_plane(plane, numbers, met) + turbulence, numbers.zones, numbers.tables)
+    alpha = rigid_body.angle_of_attack(numbers.tables, motion.attitude, motion.lateral_velocity, zones.reference)
     blocks = [
         *_rigid_body(motion, solved),
         *control.blocks,
         *_bending(motion, solved),
         *_slosh(motion, solved, numbers.tanks),
+        *zones.blocks,
     ]
     positions, moving = _position(plane, motion), len(blocks)
     blocks += positions
@@ -95,7 +96,7 @@ def plane_equations(plane: Plane, numbers: Numbers, turbulence: ca.SX, winds: Wi
         ca.vertcat(*(block.symbols for block in blocks)),
         rates=ca.vertcat(*(block.rates for block in blocks)),
         outputs=ca.vertcat(*(value for _, value in responses)),
-        angles=ca.vertcat(alpha, control.engine_angle),
+        angles=ca.vertcat(alpha, control.engine_angle, zones.angles),
         responses=tuple(label.name for label, _ in responses),
         handles=handles,
     )

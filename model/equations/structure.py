@@ -39,6 +39,7 @@ def structure_in_words(vehicle: Vehicle, states: int, groups: Sequence[TableGrou
         "transfer function orders": ", ".join(orders),
         "wind filter": f"order {vehicle.wind.shaping_filter.order}, {vehicle.wind.shaping_filter.noise_count} noises",
         **({"turbulence": f"{turbulence.form}, order {turbulence.order}"} if turbulence else {}),
+        **({"gust zones": str(vehicle.zones.count)} if vehicle.zones else {}),
         "noise sources": ", ".join(f"{n} ({'white' if e.white else 'coloured'})" for n, e in vehicle.noise.items()),
         "loads": ", ".join(load_outputs(file)),
         "extra outputs": ", ".join(file.options.extra_outputs) or "none",

@@ -90,6 +90,8 @@ class Numbers:
     undisturbed : SX
         The known input of value one that carries what no wind and no deviation makes: the axial force's mean.
     turbulence : TurbulenceNumbers or None
+    zones : int
+        Gust zones; one is the whole vehicle.
     """
 
     time: ca.SX
@@ -111,6 +113,7 @@ class Numbers:
     radii: dict[str, ca.SX]
     undisturbed: ca.SX
     turbulence: TurbulenceNumbers | None
+    zones: int
 
     @property
     def deviations(self) -> dict[str, NoiseProcess]:
@@ -170,6 +173,7 @@ class Numbers:
             },
             undisturbed=shared.undisturbed,
             turbulence=TurbulenceNumbers.of(vehicle.turbulence, parameters) if vehicle.turbulence else None,
+            zones=1 if vehicle.zones is None else vehicle.zones.count,
         )
 
 

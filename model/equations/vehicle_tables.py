@@ -18,6 +18,7 @@ MEAN_TABLES = {
     "mean.engine_angle": ("output", "engine_angle"),
     "mean.attitude": ("state", "attitude"),
 }
+MET_ALTITUDE = "met_altitude"  # of the foremost gust zone; its rate is another table
 MEAN_SPACING = 0.05  # s, of the tables of the mean response
 
 
@@ -25,6 +26,10 @@ def vehicle_tables(vehicle: Vehicle) -> tuple[TableGroup, ...]:
     """Return the table groups of a vehicle: over time, over altitude, and the mean response (zero until computed)."""
     polynomials = [(t.name, t.unit, t.polynomial) for t in vehicle.tables.values()]
     polynomials.append(("altitude_rate", "m/s", vehicle.tables["altitude"].polynomial.derivative()))
+    met = met_altitude_name(vehicle)
+    if vehicle.zones is not None:
+        polynomials.append((met, "m", vehicle.met_altitude))
+        polynomials.append((f"{met}_rate", "m/s", vehicle.met_altitude.derivative()))
     flight = TableGroup.from_polynomials("flight", "time", polynomials, vehicle.start, vehicle.end)
     wind = vehicle.wind.shaping_filter
     own = [*vehicle.wind.means, *wind.tables()]
@@ -32,7 +37,7 @@ def vehicle_tables(vehicle: Vehicle) -> tuple[TableGroup, ...]:
         own.append(vehicle.turbulence.intensity)
     over_altitude = [(t.name, t.unit, t.polynomial) for t in own]
     bottom, top = min(float(t.argument[0]) for t in own), max(float(t.argument[-1]) for t in own)
-    wind_group = TableGroup.from_polynomials("wind", "altitude", over_altitude, bottom, top)
+    wind_group = TableGroup.from_polynomials("wind", met, over_altitude, bottom, top)
     knots = mean_knots(vehicle.start, vehicle.end, vehicle.discontinuities)
     names = tuple(f"{plane.scope}{name}" for plane in flown_planes(vehicle) for name in MEAN_TABLES)
     zero = np.zeros((knots.size - 1, 4, len(names)))
@@ -51,6 +56,11 @@ def mean_source(table: str) -> tuple[str, str]:
 def is_mean(table: str) -> bool:
     """Tell whether a table is of the mean response."""
     return any(table == name or table.endswith(f".{name}") for name in MEAN_TABLES)
+
+
+def met_altitude_name(vehicle: Vehicle) -> str:
+    """Return the table whose value is the altitude of the wind that is met."""
+    return "altitude" if vehicle.zones is None else MET_ALTITUDE
 
 
 def mean_knots(start: float, end: float, discontinuities: Sequence[float]) -> np.ndarray:

@@ -188,6 +188,15 @@ def local_load_columns(modes: int) -> tuple[Column, ...]:
     )
 
 
+def normal_force_columns(modes: int) -> tuple[Column, ...]:
+    """Return the columns of the normal force by strips along the vehicle."""
+    return (
+        Column("normal_force_slope", "1/rad", "", "integral of c'_N over a strip about s"),
+        Column("first_moment", "m/rad", "", "of c'_N times x"),
+        *(Column(f"displacement_{i}", "1/rad", "", f"of c'_N times Y_{i}") for i in _count(modes)),
+    )
+
+
 # of a load's shear force: as of its moment, without the lever arm
 SHEAR_REACTION = (
     Column("first_moment", "kg", "0", "S_1 of the shear force: mass forward of s"),

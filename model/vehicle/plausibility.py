@@ -43,6 +43,7 @@ BIASES = {
     "thrust_misalignment": (math.degrees(1.0), 1e-3, 1.0, "degrees"),
     "wind": (1.0, 5e-4, 0.5, "parts of 1"),
 }
+STRIPS = 1e-3  # of their size, by which strips of the normal force may miss the vehicle's own
 CURVED = 3.0  # times the waves of a uniform beam: slopes change faster where a vehicle is slender
 NEAREST = 0.02  # of the length, between places whose displacements tell a slope
 MOST_TOLD = 3
@@ -109,6 +110,7 @@ def contradictions(vehicle: Vehicle) -> list[Contradiction]:
         *compared.aerodynamics(),
         *compared.moments(),
         *compared.stations(),
+        *compared.strips(),
         *compared.rows(),
         *compared.ends(),
         *assumptions(vehicle),
@@ -615,6 +617,39 @@ class _Compared:
         for tank in self.vehicle.slosh:
             yield from placed(f"slosh.{tank.name}", "attach_point", self.at(f"slosh.{tank.name}.attach_point"))
         yield from self._load_stations(placed)
+
+    def strips(self) -> Iterator[Contradiction]:
+        """Strips of the normal force add up to the vehicle's own, and lie on it."""
+        if self.vehicle.zones is None:
+            return
+        strips = self.vehicle.zones.strips
+        time = strips.time[(strips.time >= self.time[0]) & (strips.time <= self.time[-1])]
+        rows, tables = np.isin(strips.time, time), self.vehicle.tables
+        slope = tables["normal_force_slope"].polynomial(time)
+        sums = {"normal_force_slope": (strips.slope, slope, "normal_force_slope")}
+        moment = slope * tables["center_of_pressure"].polynomial(time)
+        sums["first_moment"] = (strips.first_moment, moment, "normal_force_slope times center_of_pressure")
+        for i, shape in enumerate(strips.displacement, start=1):
+            name = f"bending.{i}.normal_force_slope_times_displacement"
+            sums[f"displacement_{i}"] = (shape, tables[name].polynomial(time), name)
+        for column, (by_strip, whole, what) in sums.items():
+            made = by_strip[rows].sum(axis=1)
+            off = np.abs(made - whole)
+            k = int(np.argmax(off))
+            if off[k] > STRIPS * np.abs(by_strip[rows]).sum(axis=1).max():
+                yield Contradiction(
+                    f"adds up to {made[k]:.6g} along the vehicle, but {what} is {whole[k]:.6g}; build the tables "
+                    "together, or look at units, signs and rows",
+                    self.files["zones"], column, float(time[k]), off[k] > 0.5 * np.abs(whole).max(),
+                )  # fmt: skip
+        reach = 6 * float(self.gyration.max())
+        off = np.abs(strips.forward_of_gimbal - float(np.median(self.center)))
+        if off.max() > reach:
+            yield Contradiction(
+                f"of {strips.forward_of_gimbal[int(np.argmax(off))]:.4g} m lies beyond the vehicle, more than six "
+                "radii of gyration from its centre of gravity; look at its unit and at the count of stations",
+                self.files["zones"], "forward_of_gimbal", None, True,
+            )  # fmt: skip
 
     def _load_stations(self, placed) -> Iterator[Contradiction]:
         toml = self.vehicle.folder / "vehicle.toml"

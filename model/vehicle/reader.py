@@ -14,7 +14,7 @@ import numpy as np
 
 from ..deprecation import warn_deprecated
 from ..errors import DataError, DataErrorCollector, PlausibilityWarning, WindWarning, suggestion
-from ..files.csv_table import CsvTable, read_csv_table
+from ..files.csv_table import CsvTable, Order, read_csv_table
 from ..files.folder_files import file_inside
 from ..files.text_file import read_text
 from ..system.switches import switch_times
@@ -28,6 +28,7 @@ from ..wind.turbulence import INTENSITY, Turbulence, turbulence_intensity
 from ..wind.two_components import TwoComponentWind
 from .columns import (
     AERODYNAMICS,
+    ALONG_ARGUMENTS,
     ALTITUDE,
     AXIAL,
     AZIMUTH_CHANGE,
@@ -48,6 +49,7 @@ from .columns import (
     bending_columns,
     local_columns,
     mode_columns,
+    normal_force_columns,
 )
 from .coverage import check_intensity, check_joint_correlation, check_schedule, check_winds, loaded_flight
 from .loads import AXIAL_FORCE, lateral_loads, load_name
@@ -66,6 +68,7 @@ from .vehicle_file import (
     WindRecordEntry,
     read_vehicle_file,
 )
+from .zones import AHEAD, Strips, Zones, is_turbulent, make_zones, zone_count
 
 REGULAR = 1.5  # times the usual step: in a table whose other steps are shorter, rows were lost at a longer one
 CONSTRUCTION_FILE = "construction.toml"
@@ -129,6 +132,7 @@ def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehi
         wind = _load_both(file.wind, reader) if file.planes == BOTH else _load_wind(file, reader)
         turbulence = _load_turbulence(file.wind.turbulence, wind, reader)
     reader.collector.raise_all()
+    zones = _load_zones(reader, file if len(names) > 1 else plane_file(file, names[0]))
     for name, noise in file.noise.items():
         for table in noise.tables:
             if table not in reader.tables:
@@ -164,6 +168,7 @@ def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehi
         discontinuities=switch_times((t for t in reader.discontinuities if start < t < last.last), start),
         sources=tuple(reader.sources),
         turbulence=turbulence,
+        zones=zones,
     )
     for plane in flown_planes(vehicle):
         check_plausibility(plane.vehicle)
@@ -191,14 +196,16 @@ def _add_tables(reader: _Reader, file: VehicleFile, scope: str = "", wanted: fro
     for load in lateral_loads(file) if "loads" in wanted else ():
         by_need, needed = load.by_need(modes), {column.name for column in of_loads}
         columns = dict.fromkeys((*load.columns(modes, tanks), *(c for c in by_need if c.name in needed)))
-        if file.options.slosh_reaction:
+        answer, zones = file.options.slosh_reaction, zone_count(file) > 1
+        if answer or zones:
             if load.station.forward_of_gimbal_m is None:
+                key = "slosh_reaction" if answer else "gust_zones"
                 raise DataError(
-                    "is missing, but options.slosh_reaction needs it; give metres forward of the gimbal plane",
+                    f"is missing, but options.{key} needs it; give metres forward of the gimbal plane",
                     file=reader.toml,
                     column=f"{scope}loads.{load.output}.forward_of_gimbal_m",
                 )
-            columns |= dict.fromkeys(load.reaction)
+            columns |= dict.fromkeys(load.reaction if answer else load.reaction[1:])
         unused = (*by_need, *(load.local_columns(modes) if load.is_shear else ()))
         name = f"{scope}loads.{load.output}"
         reader.add(name, load.table, tuple(columns), f"{name}.", unused)
@@ -318,9 +325,10 @@ class _Reader:
         columns: Iterable[Column],
         argument: Column,
         unused: Iterable[Column] = (),
+        order: Order = "increasing",
     ) -> CsvTable:
         columns = tuple(columns)
-        csv = read_csv_table(file_inside(self.folder, entry.file), argument.name, argument.unit)
+        csv = read_csv_table(file_inside(self.folder, entry.file), argument.name, argument.unit, order=order)
         x, collector = csv.columns[argument.name], DataErrorCollector()
         for column in columns:
             with collector.part():
@@ -366,15 +374,7 @@ class _Reader:
             if column.name in csv.columns:
                 csv.column(column.name, column.unit)
                 columns = (*columns, column)
-        for event in entry.events:
-            if event not in self.events:
-                raise DataError(
-                    f"event '{event}' is not listed under [events]{suggestion(event, self.events)}",
-                    file=self.toml,
-                    column=name,
-                )
-        breaks = tuple(sorted(self.events[event] for event in entry.events))
-        self.discontinuities.update(breaks)
+        breaks = self.breaks(name, entry)
         x = csv.columns["time"]
         _warn_of_gap(csv, 4 if entry.interpolation in ("cubic", "pchip") else 10)
         if entry.interpolation == "step":
@@ -388,6 +388,19 @@ class _Reader:
             self.tables[table.name] = table
             if "control." in name:
                 self.schedules[name] = (table, csv.file)
+
+    def breaks(self, name: str, entry: TableEntry) -> tuple[float, ...]:
+        """Return the times (s) at which a table may jump."""
+        for event in entry.events:
+            if event not in self.events:
+                raise DataError(
+                    f"event '{event}' is not listed under [events]{suggestion(event, self.events)}",
+                    file=self.toml,
+                    column=name,
+                )
+        found = tuple(sorted(self.events[event] for event in entry.events))
+        self.discontinuities.update(found)
+        return found
 
     def _check_between_rows(self, table: Table, sign: str) -> None:
         """Refuse an interpolation that leaves the range its rows keep, and an altitude that does not increase."""
@@ -541,6 +554,45 @@ def _load_wind(vehicle: VehicleFile, reader: _Reader) -> WindModel:
         return WindModel(mean_table, shaping_filter, deviation, record)
     except DataError as error:
         raise DataError(error.why, file=file) from None
+
+
+def _load_zones(reader: _Reader, file: VehicleFile) -> Zones | None:
+    """Return the gust zones of a vehicle and put their tables among the others; None where it feels one wind."""
+    entry, tables, count = file.tables.normal_force_along_vehicle, reader.tables, zone_count(file)
+    if count == 1:
+        if is_turbulent(file) and entry is None and file.options.gust_zones is None:
+            warnings.warn(
+                WindWarning(
+                    f"{reader.toml} has turbulence but no tables.normal_force_along_vehicle: the whole vehicle feels "
+                    "every gust at once. 'ascentwind build-vehicle' makes the table; options.gust_zones = 1 keeps it "
+                    "so without this warning"
+                ),
+                stacklevel=3,
+            )
+        return None
+    if file.planes == BOTH:
+        why = 'are of one plane so far; leave the key out, or fly planes = "yaw" or "pitch"'
+        raise DataError(why, file=reader.toml, column="options.gust_zones")
+    if entry is None:
+        why = "is missing, but options.gust_zones needs it; 'ascentwind build-vehicle' makes it"
+        raise DataError(why, file=reader.toml, column="tables.normal_force_along_vehicle")
+    modes = len(file.bending)
+    columns = (*ALONG_ARGUMENTS[1:], *normal_force_columns(modes))
+    csv = reader.read("zones", entry, columns, TIME, order="not decreasing")
+    strips = Strips.read(csv, modes, entry.interpolation, reader.breaks("zones", entry))
+    time, low = strips.time, reader.file.start_time_s
+    values = {n: tables[n].polynomial(time) for n in ("dynamic_pressure", "center_of_gravity", "relative_velocity")}
+    places = [load.forward_of_gimbal_m for load in file.loads if load.forward_of_gimbal_m is not None]
+    weight = np.where(time >= low, values["dynamic_pressure"], 0.0)
+    zones = make_zones(strips, count, weight, places, csv.file)
+    found = [*zones.tables(), *zones.rate_tables(values["relative_velocity"])]
+    for load in lateral_loads(file):
+        assert load.station.forward_of_gimbal_m is not None  # its error was raised
+        found += zones.load_tables(load.output, load.station.forward_of_gimbal_m, load.is_shear)
+    rise = tables["altitude"].polynomial.derivative()(time) / values["relative_velocity"]
+    found.append(strips.table(AHEAD, "m", (zones.position[0] - values["center_of_gravity"]) * np.minimum(rise, 1.0)))
+    tables |= {table.name: table for table in found}
+    return zones
 
 
 def _load_turbulence(

@@ -36,6 +36,8 @@ def table_columns(file: VehicleFile) -> dict[str, tuple[Column, ...]]:
         found[tables.shear_along_vehicle.file] = (*c.ALONG_ARGUMENTS, *c.whole_shear_columns(modes))
     if tables.axial_along_vehicle:
         found[tables.axial_along_vehicle.file] = (*c.ALONG_ARGUMENTS, *c.AXIAL, c.RADIUS)
+    if tables.normal_force_along_vehicle:
+        found[tables.normal_force_along_vehicle.file] = (*c.ALONG_ARGUMENTS, *c.normal_force_columns(modes))
     if file.wind.turbulence and file.wind.turbulence.intensity:
         found[file.wind.turbulence.intensity.file] = (c.ALTITUDE, *c.TURBULENCE)
     return found | {file.wind.statistics.file: (c.ALTITUDE, *c.WIND)}

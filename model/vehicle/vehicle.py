@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
-from ..tables import Table
+import numpy as np
+from scipy.interpolate import PPoly
+
+from ..tables import Table, taylor_coefficients
 from ..wind.statistics import WindModel
 from ..wind.turbulence import Turbulence
 from ..wind.two_components import TwoComponentWind
@@ -16,6 +20,7 @@ from .vehicle_file import (
     TransferFunctionEntry,
     VehicleFile,
 )
+from .zones import AHEAD, Zones
 
 
 @dataclass(frozen=True)
@@ -52,6 +57,8 @@ class Vehicle:
         Provenance by file.
     turbulence : Turbulence, optional
         Beside the wind of the statistics, whichever that is.
+    zones : Zones, optional
+        That enter a gust one after the other; without, the whole vehicle feels one wind.
     """
 
     name: str
@@ -65,6 +72,7 @@ class Vehicle:
     discontinuities: tuple[float, ...]
     sources: tuple[TableSource, ...]
     turbulence: Turbulence | None = None
+    zones: Zones | None = None
 
     def __repr__(self) -> str:
         parts = f"{len(self.bending)} bending modes, {len(self.slosh)} slosh masses, {len(self.noise)} noises"
@@ -75,8 +83,14 @@ class Vehicle:
 
     @property
     def start_altitude(self) -> float:
-        """Altitude where the flight starts, m."""
-        return float(self.tables["altitude"].polynomial(self.start))
+        """Altitude where the flight starts in its wind, m."""
+        return float(self.met_altitude(self.start))
+
+    @cached_property
+    def met_altitude(self) -> PPoly:
+        """Altitude (m) over time at which the vehicle meets the wind: of its foremost gust zone, or its own."""
+        altitude = self.tables["altitude"].polynomial
+        return altitude if self.zones is None else _sum(altitude, self.tables[AHEAD].polynomial)
 
     @property
     def bending(self) -> tuple[BendingEntry, ...]:
@@ -94,3 +108,12 @@ class Vehicle:
     def transfer_functions(self) -> dict[str, TransferFunctionEntry]:
         """T1 (attitude), T2 (attitude rate) and T3 (actuator), equations 4-5 to 4-7."""
         return {"T1": self.file.control.T1, "T2": self.file.control.T2, "T3": self.file.control.T3}
+
+
+def _sum(first: PPoly, second: PPoly) -> PPoly:
+    """Return the sum of two piecewise cubics where both are known."""
+    low, high = max(first.x[0], second.x[0]), min(first.x[-1], second.x[-1])
+    knots = np.unique(np.concatenate([[low, high], first.x, second.x]))
+    knots = knots[(knots >= low) & (knots <= high)]
+    middle = 0.5 * (knots[:-1] + knots[1:])
+    return PPoly(sum(taylor_coefficients(p, knots[:-1], middle) for p in (first, second)), knots)

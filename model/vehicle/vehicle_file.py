@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, model_validator
 
 from ..files.folder_files import FileName
-from ..files.toml_file import Name, NotNegative, Positive, Section, read_toml
+from ..files.toml_file import Name, NotNegative, Positive, Section, Whole, read_toml
 from ..wind.turbulence import HIGH_PASS, LENGTH
 
 ExtraOutput = Literal["lateral_drift", "drift_rate", "dynamic_pressure_times_angle_of_attack", "load_components"]
@@ -313,6 +313,7 @@ class OptionsEntry(Section):
     noise_loads: NoiseLoads = "moved_line"
     mean_response: Literal["linear", "nonlinear"] = "linear"
     extra_outputs: tuple[ExtraOutput, ...] = ()
+    gust_zones: Annotated[Whole, Field(ge=1)] | None = None
 
 
 class TablesEntry(Section):
@@ -324,6 +325,7 @@ class TablesEntry(Section):
     loads_along_vehicle: TableEntry | None = None
     shear_along_vehicle: TableEntry | None = None
     axial_along_vehicle: TableEntry | None = None
+    normal_force_along_vehicle: TableEntry | None = None
 
 
 class PlaneTablesEntry(Section):

@@ -17,7 +17,7 @@ NEWTON_STEPS = 4
 
 @dataclass(frozen=True, eq=False)
 class Climb:
-    """A flight that always climbs.
+    """A flight that always climbs, by the altitude at which the vehicle meets its wind.
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ class Climb:
         vehicle = case.vehicle_for("a wind over altitude")
         start, end = case.system.start, case.system.end
         times = np.linspace(start, end, max(2, int(np.ceil((end - start) / SAMPLES)) + 1))
-        polynomial = vehicle.tables["altitude"].polynomial
+        polynomial = vehicle.met_altitude
         altitudes = polynomial(times)
         if not (np.diff(altitudes) > 0).all():
             at = times[int(np.argmin(np.diff(altitudes) > 0))]

@@ -141,8 +141,23 @@ def run(
         console.print(
             check.verdict(), style="green" if agree else "bold red", markup=False, highlight=False, soft_wrap=True
         )
+    if flown.zones is not None and check is not None:
+        agree = _check_delays(study, check) and agree
     if not agree:
         raise typer.Exit(1)
+
+
+def _check_delays(study: Study, check: PeakCheck) -> bool:
+    """Hold rational delays of gusts against exact ones at the first response's peak; say it and whether they agree."""
+    from ..statistics.exact_penetration import verdict
+
+    try:
+        with console.status("gusts with exact delays"):
+            text, agree = verdict(study.check_gust_penetration(check.peaks[0].time))
+    except AscentwindError as error:
+        text, agree = f"The delays of gusts along the vehicle stand unchecked: {error}", False
+    console.print(text, style="green" if agree else "bold red", markup=False, highlight=False, soft_wrap=True)
+    return agree
 
 
 def _check_peaks(study: Study, statistics: ResponseStatistics) -> PeakCheck | None:

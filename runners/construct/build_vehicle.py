@@ -251,6 +251,7 @@ def table_entries(file: VehicleFile) -> dict[str, TableEntry]:
         "tables.loads_along_vehicle": tables.loads_along_vehicle,
         "tables.shear_along_vehicle": tables.shear_along_vehicle,
         "tables.axial_along_vehicle": tables.axial_along_vehicle,
+        "tables.normal_force_along_vehicle": tables.normal_force_along_vehicle,
         **{f"bending.{i}.table": mode.table for i, mode in enumerate(file.bending)},
         **{f"slosh.{tank.name}.table": tank.table for tank in file.slosh},
         **{f"control.{name}.modes": sensor.modes for name, sensor in file.control.load_relief.items()},

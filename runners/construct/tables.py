@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from ...model.vehicle.columns import ALONG_ARGUMENTS, RADIUS
 from ...model.vehicle.vehicle_file import VehicleFile
+from . import aerodynamics
+from .line_integrals import Line
 from .loads import load_columns, local_load_columns, shear_columns
 from .vehicle_numbers import VehicleNumbers
 
@@ -88,15 +90,27 @@ def vehicle_tables(numbers: VehicleNumbers, file: VehicleFile) -> dict[str, tupl
     if file.tables.loads_along_vehicle is not None:
         note = "coefficients of the bending moment at stations along the whole vehicle"
         by_station = [_load(numbers, s) | _local_load(numbers, s) for s in range(numbers.stations.size)]
-        tables[file.tables.loads_along_vehicle.file] = note, _along(numbers, file.start_time_s, by_station)
+        tables[file.tables.loads_along_vehicle.file] = (
+            note,
+            _along(numbers, file.start_time_s, numbers.stations, by_station),
+        )
     if file.tables.shear_along_vehicle is not None:
         note = "coefficients of the shear force at stations along the whole vehicle"
         by_station = [_shear(numbers, s) for s in range(numbers.stations.size)]
-        tables[file.tables.shear_along_vehicle.file] = note, _along(numbers, file.start_time_s, by_station)
+        tables[file.tables.shear_along_vehicle.file] = (
+            note,
+            _along(numbers, file.start_time_s, numbers.stations, by_station),
+        )
     if file.tables.axial_along_vehicle is not None:
         note = "coefficients of the axial force at stations along the whole vehicle"
         by_station = [_axial(numbers, s) | _radius(numbers, s) for s in range(numbers.stations.size)]
-        tables[file.tables.axial_along_vehicle.file] = note, _along(numbers, file.start_time_s, by_station)
+        tables[file.tables.axial_along_vehicle.file] = (
+            note,
+            _along(numbers, file.start_time_s, numbers.stations, by_station),
+        )
+    if file.tables.normal_force_along_vehicle is not None:
+        note = "normal force by strips along the vehicle, cut at the load stations; stations are their middles"
+        tables[file.tables.normal_force_along_vehicle.file] = note, _strips(numbers, file.start_time_s)
     return tables
 
 
@@ -186,9 +200,9 @@ def _radius(numbers: VehicleNumbers, station: int) -> Columns:
     return {(RADIUS.name, RADIUS.unit): np.full(numbers.flight.time.size, float(radius))}
 
 
-def _along(numbers: VehicleNumbers, start: float, by_station: Sequence[Columns]) -> Columns:
-    """Return the loads of all stations, time by time from the last row before the start of the model on."""
-    times, stations = numbers.flight.time, numbers.stations
+def _along(numbers: VehicleNumbers, start: float, stations: Array, by_station: Sequence[Columns]) -> Columns:
+    """Return columns at all stations, time by time from the last row before the start of the model on."""
+    times = numbers.flight.time
     times = times[max(0, int(np.searchsorted(times, start, side="right")) - 1) :]
     gimbal = numbers.construction.gimbal_station
     values = (np.repeat(times, stations.size), *(np.tile(x, times.size) for x in (stations + gimbal, stations)))
@@ -196,6 +210,24 @@ def _along(numbers: VehicleNumbers, start: float, by_station: Sequence[Columns])
     return arguments | {
         key: np.array([found[key][-times.size :] for found in by_station]).T.ravel() for key in by_station[0]
     }
+
+
+def _strips(numbers: VehicleNumbers, start: float) -> Columns:
+    """Return the normal force by strips between stations and its corners; those without any are left out."""
+    edges = Line.cut_at(numbers.stations, aerodynamics.knots(numbers.construction)).edges
+    integrands = {
+        ("normal_force_slope", "1/rad"): numbers.intensity,
+        ("first_moment", "m/rad"): numbers.intensity * numbers.line.points,
+        **{
+            (f"displacement_{i + 1}", "1/rad"): numbers.intensity * numbers.displacement[:, i]
+            for i in range(numbers.construction.bending_modes)
+        },
+    }
+    found = {key: -np.diff(numbers.line.forward(density, edges)) for key, density in integrands.items()}
+    size = np.abs(found["normal_force_slope", "1/rad"]).max(axis=0)
+    kept = np.flatnonzero(size > ROUNDING * size.max())
+    by_strip = [{key: values[:, k] for key, values in found.items()} for k in kept]
+    return _along(numbers, start, 0.5 * (edges[:-1] + edges[1:])[kept], by_strip)
 
 
 def _local_integrals(numbers: VehicleNumbers) -> Columns:

@@ -18,8 +18,10 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.sparse import csc_array
 
+from ...model.equations.vehicle_tables import MET_ALTITUDE
 from ...model.tables import ORDER, Table, TableGroup
 from ...model.vehicle.vehicle import Vehicle
+from ...model.vehicle.zones import AHEAD
 from ..present.netcdf import RULE
 from .pair import AdjointPair
 from .start import StartShare
@@ -28,6 +30,7 @@ from .tables import Parts, TotalDensity
 if TYPE_CHECKING:
     from ..case.case import Case
 
+RATES = {"altitude_rate": "altitude", f"{MET_ALTITUDE}_rate": MET_ALTITUDE}
 PCHIP_STEP = 1e-5  # of a table's largest value
 
 
@@ -72,10 +75,13 @@ def knot_sensitivities(
         first = last
     if start is not None:
         _add_start(groups, start, case.system.start, moments)
-    rate = moments.get("altitude_rate")
-    if rate is not None:  # the slope of the altitude: c1 + 2 c2 u + 3 c3 u^2
-        moments["altitude"] = moments["altitude"].copy()
-        moments["altitude"][:, 1:] += np.arange(1, ORDER) * rate[:, :-1]
+    for name, of in RATES.items():  # the slope of an altitude: c1 + 2 c2 u + 3 c3 u^2
+        if name in moments:
+            moments[of] = moments[of].copy()
+            moments[of][:, 1:] += np.arange(1, ORDER) * moments[name][:, :-1]
+    if MET_ALTITUDE in moments:  # the sum of both
+        for name in ("altitude", AHEAD):
+            moments[name] = moments[name] + moments[MET_ALTITUDE]
     knots_of = {name: group.knots for group in groups for name in group.names}
     alike: dict[tuple, list[str]] = {}
     for name, table in rows.items():

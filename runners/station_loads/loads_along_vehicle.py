@@ -18,6 +18,7 @@ from ...codegen.system.evaluation import MatrixEvaluator
 from ...model.equations.load_components import component_columns, deviation_output
 from ...model.equations.loads import axial_force, axial_noise
 from ...model.equations.noise_loads import noise_load
+from ...model.equations.penetration import zone_coefficient
 from ...model.equations.station_loads import KEYS, StationLoads, load_station_loads, station_table
 from ...model.errors import DataError, IntegrationError, UnknownNameError
 from ...model.system.names import COMBINED
@@ -25,6 +26,7 @@ from ...model.vehicle.columns import local_load_columns
 from ...model.vehicle.loads import AXIAL_FORCE, BENDING_MOMENT, SHEAR_FORCE, SIDES
 from ...model.vehicle.noise_loads import component_deviations, deviating_tables, loading_deviations
 from ...model.vehicle.vehicle import Vehicle
+from ...model.vehicle.zones import PREFIX as ZONES
 from ..case.case import Case
 from ..case.provenance import provenance
 from ..solvers.time_nodes import interval_before, time_nodes
@@ -273,7 +275,7 @@ def _along(case: Case, vehicle: Vehicle, load: str, times: Array, slosh_reaction
     lateral = next((table for table in columns if table != AXIAL_FORCE), None)
     if lateral is not None:
         part = parts[_tables(load).index(lateral)]
-        across = _lateral_rows(case, vehicle, lateral, part, columns[lateral], flight, slosh_reaction)
+        across = _lateral_rows(case, vehicle, lateral, part, columns[lateral], flight, times, slosh_reaction)
         if load in SIDES:
             radius = columns[AXIAL_FORCE]["radius"]  # zero at a tip, where no moment is
             across *= SIDES[load] * np.divide(2.0, radius, out=zero.copy(), where=radius > 0)[:, :, None]
@@ -299,6 +301,7 @@ def _lateral_rows(
     part: StationLoads,
     columns: dict[str, Array],
     flight: dict[str, Array],
+    times: Array,
     slosh_reaction: bool,
 ) -> Array:
     tanks, file = [tank.name for tank in vehicle.slosh], vehicle.file
@@ -317,6 +320,11 @@ def _lateral_rows(
             pull = columns[f"p_delta_{i}"] * flight["thrust"] / flight["mass"]
             columns[f"bending_displacement_{i}"] = columns[f"bending_displacement_{i}"] + pull
     area, form = case.parameters["reference_area"].value, file.options.noise_loads
+    if vehicle.zones is not None:
+        forward_of = vehicle.zones.along(times, part.forward_of_gimbal, load == SHEAR_FORCE)
+        for j in range(1, vehicle.zones.count + 1):
+            turned = flight[f"{ZONES}first_moment_{j}"]
+            columns[f"zone_angle_{j}"] = zone_coefficient(columns, flight, area, forward_of[:, :, j - 1], turned)
     if load == SHEAR_FORCE and form == "couple_forward":
         form = "couple_aft"  # a couple makes no shear but by the vehicle's answer to it, wherever it acts
     means = flight["mean.angle_of_attack"], flight["mean.engine_angle"]
@@ -354,7 +362,8 @@ def _tables(load: str) -> tuple[str, ...]:
 
 def _columns(vehicle: Vehicle) -> dict[str, str]:
     tanks = [tank.name for tank in vehicle.slosh]
-    return component_columns(len(vehicle.bending), tanks, component_deviations(vehicle.file))
+    zones = 1 if vehicle.zones is None else vehicle.zones.count
+    return component_columns(len(vehicle.bending), tanks, component_deviations(vehicle.file), zones)
 
 
 def _components(vehicle: Vehicle) -> list[str]:
