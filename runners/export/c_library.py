@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...codegen.export.source import Expected, ExportError, FlightCuts, MeasuredInput, library_files
+from ...model.equations.vehicle_tables import MET_ALTITUDE
 from ...model.errors import DirectNoiseError
 from ...model.system.names import COMBINED, WIND
 from ...model.system.switches import ROUNDINGS
@@ -26,7 +27,6 @@ from ..statistics.sweep import Sweep
 
 SAME_CODE, OTHER_CODE = 1e-9, 1e-4  # how far a library may be from the sweep's numbers, and from CVODES's
 TIMES = 100  # of a flight whose vehicle names none
-ALTITUDE = "altitude"
 POINTS = 1000  # of the example of a measured wind
 LIMIT = 1.25  # of the largest |mean| + 3 sigma: limits made up for the example
 
@@ -136,12 +136,13 @@ def _measured_wind(case: Case, statistics: ResponseStatistics | None) -> Measure
     executable, system = case.with_means, case.system
     times = np.linspace(system.start, system.end, POINTS + 1)
     winds = [float(executable.matrices(t, system.start, system.end)["inputs"][which, 0]) for t in times]
-    altitudes = [case.tables(t)[ALTITUDE] for t in times]
+    met = MET_ALTITUDE if MET_ALTITUDE in case.tables(system.start) else "altitude"
+    altitudes = [case.tables(t)[met] for t in times]
     higher = [k for k, h in enumerate(altitudes) if not k or h > max(altitudes[:k])]
     combined = statistics.std.sel(source=COMBINED)
     peaks = (np.abs(statistics.mean.sel(source=COMBINED)) + 3 * combined).max("time")
     limits = {str(name): float(f"{LIMIT * peaks.sel(response=name).item():.3g}") for name in peaks["response"].values}
     return MeasuredInput(
-        WIND, ALTITUDE, np.array(altitudes)[higher], np.array(winds)[higher], "m/s",
+        WIND, met, np.array(altitudes)[higher], np.array(winds)[higher], "m/s",
         {name: limit for name, limit in limits.items() if limit > 0},
     )  # fmt: skip

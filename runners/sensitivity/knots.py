@@ -118,9 +118,9 @@ def _add_start(groups: tuple[TableGroup, ...], start: StartShare, begin: float, 
     found = interval_moments(of_filter, start.altitudes, np.stack(list(start.by_table.values()), axis=1))
     for name, part in zip(start.by_table, np.moveaxis(found, 2, 0), strict=True):
         moments[name] = moments[name] + part
-    by_altitude = np.array([[start.by_altitude]])
-    at_start = interval_moments(group_of["altitude"], np.array([begin]), by_altitude)[..., 0]
-    moments["altitude"] = moments["altitude"] + at_start
+    met = MET_ALTITUDE if MET_ALTITUDE in moments else "altitude"
+    at_start = interval_moments(group_of[met], np.array([begin]), np.array([[start.by_altitude]]))[..., 0]
+    moments[met] = moments[met] + at_start
 
 
 def interval_moments(group: TableGroup, points: NDArray, weighted: NDArray) -> NDArray[np.float64]:

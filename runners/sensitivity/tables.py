@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ...model.equations.vehicle_tables import MET_ALTITUDE
 from ...model.tables import TableGroup
 from ...model.vehicle.grouped_factors import grouped_factors
 from ...model.vehicle.vehicle import Vehicle
@@ -145,7 +146,7 @@ def _through_start(case: Case, start: StartShare, names: list[str]) -> NDArray[n
             values = dict(zip(group.names, group.evaluate(start.altitudes).T, strict=True))
             for name, weights in start.by_table.items():
                 found[names.index(name)] = weights @ values[name]
-    at = names.index("altitude")
+    at = names.index(MET_ALTITUDE if MET_ALTITUDE in names else "altitude")
     found[at] = start.by_altitude * tables_at(groups, np.array([case.system.start]))[0, at]
     return found
 
