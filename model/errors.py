@@ -116,20 +116,21 @@ class TimeRangeError(AscentwindError):
 
 
 class PlanesError(AscentwindError):
-    """Something was asked of a vehicle in both planes that is known for one alone.
+    """Something was asked of a vehicle in planes that it is not known for.
 
     Parameters
     ----------
     what : str
         Begins the sentence.
     vehicle : str
+    plane : str, optional
+        The only one that it is known for.
     """
 
-    def __init__(self, what: str, vehicle: str):
-        super().__init__(
-            f"{what} is known for one plane alone, and '{vehicle}' flies in both; ask it of planes = \"yaw\" or "
-            'planes = "pitch"'
-        )
+    def __init__(self, what: str, vehicle: str, plane: str = ""):
+        alone = f"the {plane} plane alone" if plane else "one plane alone"
+        choice = f'planes = "{plane}"' if plane else 'planes = "yaw" or planes = "pitch"'
+        super().__init__(f"{what} is known for {alone}, which is not how '{vehicle}' flies; ask it of {choice}")
 
     @classmethod
     def of_one(cls, what: str, system: str) -> PlanesError:

@@ -25,6 +25,7 @@ from .flight_load.limit_table import Limits
 from .flight_load.limits import limit_passage
 from .flight_load.load import DESIGN, DRAWS, FlightLoad, flight_load
 from .flight_load.passage import Passage
+from .flight_load.resultant import ResultantLoad, resultant_load
 from .flight_load.window import checked_window
 from .gusts.response import gust_response
 from .gusts.search import GustSweep, gust_sweep
@@ -392,6 +393,41 @@ class Study(Case):
             The vehicle has stations outside those of the table.
         """
         return limit_passage(self, limits, window, probability, sides, draws, seed)
+
+    def resultant_load(
+        self,
+        resultant: str,
+        window: tuple[float, float] | None = None,
+        probabilities: float | Iterable[float] = DESIGN,
+        *,
+        draws: int = DRAWS,
+        seed: int = 504,
+    ) -> ResultantLoad:
+        """Return the largest resultant over a window of flight, jointly over both planes.
+
+        Parameters
+        ----------
+        resultant : str
+            Such as 'resultant_bending_moment' or 'total_angle_of_attack'.
+        window : (float, float), optional
+            s; the vehicle's default times without it.
+        probabilities : float or iterable of float
+            Each a probability with which the flight's largest resultant passes its level.
+        draws, seed : int
+            Number of paths, and the seed of the draws.
+
+        Returns
+        -------
+        ResultantLoad
+            ``level``, ``interval``, ``probability(level)``, ``passing(times, limit)``.
+
+        Raises
+        ------
+        PlanesError
+            The system has one plane.
+        UnknownNameError, TimeRangeError, ParameterValueError, NoVarianceError, IntegrationError
+        """
+        return resultant_load(self, resultant, window, probabilities, draws, seed)
 
     def percentile_sensitivity(
         self, resultant: str, time: float, probability: float = LIKE_3_SIGMA, parameters: Iterable[str] | None = None

@@ -113,6 +113,17 @@ def one_wind(vehicle: Vehicle, what: str) -> WindModel:
     return vehicle.wind
 
 
+def require_yaw(vehicle: Vehicle, what: str) -> None:
+    """Raise where a vehicle flies in another plane than yaw, of which ``what`` alone is known.
+
+    Raises
+    ------
+    PlanesError
+    """
+    if vehicle.file.planes != "yaw":
+        raise PlanesError(what, vehicle.name, "yaw")
+
+
 def paired(names: Iterable[str]) -> dict[str, tuple[str, str]]:
     """Return by their common name the responses that both planes have, (pitch, yaw)."""
     names, (first, second) = list(names), (f"{plane}_" for plane in PLANES)

@@ -43,6 +43,10 @@ def run(
     ] = None,
     changes: Changes = None,
     turbulence: Turbulence = None,
+    azimuths: Annotated[
+        str | None,
+        typer.Option(help="Azimuths in deg, START:STOP:STEP or A1,A2,...: resultants of both planes by each."),
+    ] = None,
     along_vehicle: Annotated[
         str | None,
         typer.Option(help="Loads along the vehicle at this time (s, or 'peak'), and its envelope."),
@@ -65,8 +69,10 @@ def run(
     from ..statistics.response_figures import weighting_figure
     from ..statistics.resultants import has_resultants
     from ..views.along_vehicle_files import prepare_along_vehicle, write_along_vehicle
+    from ..views.azimuth_sweep import check_turns, checked_azimuths
 
     chances = checked_probabilities(probability) if probability else ()
+    turns = checked_azimuths(parse_times(azimuths)) if azimuths else []
     settings = {"method": method, "relative_tolerance": tolerance}
     engine_from(engine, **settings)  # refused before anything is computed
     if times and "default_times" in parse_changes(changes or []):
@@ -79,6 +85,8 @@ def run(
     moment_time = None if along_vehicle is None else prepare_along_vehicle(study, along_vehicle)
     families = [t for t in flown.file.weighting_times_s if study.system.start < t <= study.system.end]
     study.checked_times(end_times)
+    if turns:
+        check_turns(study)
     job = Job(out or results_folder(vehicle, "results"))
     with steps("end times", len(end_times)) as bar:
         statistics = study.response_statistics(
@@ -119,6 +127,9 @@ def run(
             job.written += write_figure(figure, job.folder, "weighting_functions")
         bar.done()
     along: list[LargestAlong] = []
+    if turns:
+        with console.status("azimuths"):
+            job.written += _write_azimuths(study, turns, end_times, flown.title, job.folder)
     if along_vehicle is not None:
         with console.status("loads along the vehicle"):
             files, along = write_along_vehicle(study, end_times, moment_time, job.folder)
@@ -242,6 +253,31 @@ def _resultant_figures(both: Resultants, title: str, folder: Path) -> list[Path]
         head = f"{title}\n{words(name).capitalize()}"
         written += write_figure(history_figure(both, name, head), folder, name)
         written += write_figure(direction_figure(both, name, head), folder, f"{name}_by_direction")
+    return written
+
+
+def _write_azimuths(
+    study: Study, azimuths: list[float], end_times: list[float], title: str, folder: Path
+) -> list[Path]:
+    """Write and print the resultants by azimuth."""
+    from ..present.files import write_whole
+    from ..present.style import display, words, write_figure
+    from ..views.azimuth_sweep import AZIMUTH, azimuth_csv, azimuth_figure, azimuth_sweep
+
+    found = azimuth_sweep(study, azimuths, end_times)
+    text, flown = azimuth_csv(found), math.degrees(study.parameters[AZIMUTH].value)
+    written = [write_whole(folder / "azimuths.csv", lambda p: p.write_text(text, encoding="utf-8"))]
+    table = Table("azimuth", title=f"Peaks of resultants by azimuth, passed with {found.attrs['probability']:.3g}")
+    names = [str(name) for name in found["resultant"].values]
+    units = [display(str(found["unit"].sel(resultant=n).item()), found["level"].sel(resultant=n)) for n in names]
+    for name, (_, unit) in zip(names, units, strict=True):
+        table.add_column(f"{words(name)}, {unit}", justify="right")
+        head = f"{title}\n{words(name).capitalize()} by azimuth"
+        written += write_figure(azimuth_figure(found, name, flown, head), folder, f"{name}_by_azimuth")
+    for azimuth, row in zip(found["azimuth"].values, found["level"].values, strict=True):
+        values = (f"{factor * value:.4g}" for (factor, _), value in zip(units, row, strict=True))
+        table.add_row(f"{azimuth:g}°", *values)
+    console.print(table)
     return written
 
 

@@ -129,7 +129,7 @@ def find_level(
     while instant(high) > 0:
         high += 2 * size
     # a path passes more often than its worst instant: the number lies above the one found from that
-    near = _root(instant, low, high, SOLVED * size)
+    near = root_between(instant, low, high, SOLVED * size)
     least = LEAST_MARGIN * size
     rough = _solve(draw_beyond(process, boundary_of(near), random, ROUGH), probability, boundary_of, near, least)
     margin = max(least, SURE * rough.error / rough.slope) if rough.slope > 0 else least
@@ -146,7 +146,8 @@ def find_level(
     return Level(value, (value - half, value + half), boundary, found, slope, draws)
 
 
-def _root(function: Callable[[float], float], low: float, high: float, accuracy: float) -> float:
+def root_between(function: Callable[[float], float], low: float, high: float, accuracy: float) -> float:
+    """Return where a function changes its sign between two numbers."""
     found = brentq(function, low, high, xtol=accuracy, full_output=False)
     assert isinstance(found, float)
     return found
@@ -177,7 +178,7 @@ def _solve(
         high = low + step
         while excess(high) > 0:
             low, high = high, high + 2 * (high - low)
-        value = _root(excess, low, high, SOLVED * step)
+        value = root_between(excess, low, high, SOLVED * step)
     at_value, farther, slope = excess(value), step, 0.0
     for _ in range(2):  # over a step in which enough of the paths stop passing
         slope = (at_value - excess(value + farther)) / farther

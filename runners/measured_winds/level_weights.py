@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 
 from ...codegen.system.evaluation import MatrixEvaluator
 from ...codegen.system.functions import state_scales
-from ...model.system.names import WIND
 from ...model.wind.propagation import exponentials
 from ..case.case import Case
 from ..case.climb import Climb
@@ -92,7 +91,7 @@ def _level_weights(case: Case, times: Sequence[float], levels: NDArray[np.float6
     climb, executable = Climb.of(case), case.with_means
     system, n = executable.system, len(executable.system.states)
     nodes = time_nodes(executable, times)
-    wind = system.input_names.index(WIND)
+    wind = case.wind_input("a measured wind")
     scale = state_scales(system)
     begin, end, low, high = _steps(case, climb, nodes, levels)
     evaluate, outputs = (

@@ -9,6 +9,7 @@ import xarray as xr
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
+from ...model.vehicle.planes import require_yaw
 from ..case.case import Case
 from ..case.provenance import provenance
 from ..present.style import STYLE, words
@@ -39,7 +40,9 @@ def mean_comparison(study: Case) -> xr.Dataset:
     DataError
         If the mean flight is unstable.
     """
-    planar = planar_mean(study.vehicle_for("the mean flight"), study.executable)
+    vehicle = study.vehicle_for("the mean flight")
+    require_yaw(vehicle, "the nonlinear mean flight")
+    planar = planar_mean(vehicle, study.executable)
     group = next(g for g in study.linear_means.groups if g.kind == "mean")
     columns = [group.names.index(f"mean.{name}") for name in RESPONSES]
     whole = group.evaluate(planar.times)[:, columns]
