@@ -30,6 +30,7 @@ from .flight_load.window import checked_window
 from .gusts.response import gust_response
 from .gusts.search import GustSweep, gust_sweep
 from .gusts.shapes import Gust, OneMinusCosine
+from .measured_winds.availability import availability
 from .measured_winds.day_of_launch import ERROR, THRESHOLD, Balloon, DayOfLaunch, day_of_launch
 from .measured_winds.fly import FlownWinds, fly
 from .measured_winds.persistence import Persistence
@@ -711,6 +712,56 @@ class Study(Case):
             self, soundings, hours_before, limits, window, responses, persistence, error, threshold, sides, draws, seed,
             component, sign,
         )  # fmt: skip
+
+    def availability(
+        self,
+        limits: str | Path | Limits,
+        *,
+        months: Sequence[str] | None = None,
+        azimuths: Iterable[float] | None = None,
+        winds: str | Path | None = None,
+        window: tuple[float, float] | None = None,
+        check_hours: float | None = None,
+        threshold: float = THRESHOLD,
+        sides: Sides = "both",
+        draws: int = DRAWS,
+        seed: int = 0,
+    ) -> xr.Dataset:
+        """Return the chance that a flight passes its limits, by month and launch azimuth, in the yaw plane.
+
+        Parameters
+        ----------
+        limits : path or Limits
+            Of responses over time.
+        months : sequence of str, optional
+            All that are there without it.
+        azimuths : iterable of float, optional
+            rad from north towards east; the vehicle's own without it.
+        winds : path, optional
+            Folder of months as ``ascentwind wind months`` writes it; those of Cape Canaveral without it.
+        window : (float, float), optional
+            As for :meth:`flight_load`, s.
+        check_hours : float, optional
+            With a sounding so many hours (h) before launch and a go below the threshold: how often it stops a launch,
+            and what risk remains, by drawn days.
+        threshold : float
+            Probability, of the check.
+        sides : {'both', 'upper', 'lower'}
+        draws : int
+            Paths of the importance sampling.
+        seed : int
+
+        Returns
+        -------
+        xarray.Dataset
+            Over (month, azimuth): ``probability``, ``lower`` and ``upper`` of its 90 % interval by the sampling of the
+            statistics, ``stopped`` and ``remaining_risk``; ``level`` (month, azimuth, response).
+
+        Raises
+        ------
+        NoVehicleError, DataError, LimitError, UnknownNameError, ParameterValueError, TimeRangeError
+        """
+        return availability(self, limits, months, azimuths, winds, window, check_hours, threshold, sides, draws, seed)
 
     def predict_wind(
         self, altitude: ArrayLike, wind: ArrayLike, ahead: ArrayLike, *, error: float = ERROR

@@ -15,6 +15,7 @@ FILES = {  # command: its file in this folder, where a function or a group of th
     "gust": "gust",
     "fly": "fly",
     "day-of-launch": "day_of_launch",
+    "availability": "availability",
     "verify": "checks",
     "tolerance": "checks",
     "sensitivity": "sensitivity",

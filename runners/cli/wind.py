@@ -11,6 +11,7 @@ from rich.table import Table
 
 from ...model.errors import DataError, OutputFolderError
 from ..present.terminal import console
+from .availability import months
 from .job import Job, load_study, steps
 from .soundings import read
 from .terminal import Changes, VehicleArgument, given, number, refuse_unused, whole
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
 wind = typer.Typer(no_args_is_help=True, help="Wind statistics, and filters that turn white noise into that wind.")
 wind.command()(read)
+wind.command()(months)
 
 Period = Annotated[str, typer.Option(help="Month in English, or annual.")]
 Component = Annotated[str, typer.Option(help="zonal or meridional.")]

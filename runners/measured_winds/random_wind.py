@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...model.wind.propagation import SPACING, transitions
+from ...model.wind.shaping_filter import ShapingFilter
 from ..case.case import Case
 from ..design_wind.design_wind import mean_wind
 from ..solvers.discretisation import symmetric_root
@@ -86,11 +87,30 @@ def random_wind(case: Case, levels: NDArray[np.float64]) -> RandomWind:
     ------
     NoVehicleError
     """
-    return case.kept(("random wind", tuple(levels.tolist())), lambda: _random_wind(case, levels))
-
-
-def _random_wind(case: Case, levels: NDArray[np.float64]) -> RandomWind:
     shaping_filter = case.vehicle_for("a random wind").wind.shaping_filter
+
+    def made() -> RandomWind:
+        scale = case.parameters["wind.sigma_scale"].value
+        return filter_wind(shaping_filter, levels, mean_wind(case, levels), scale)
+
+    return case.kept(("random wind", tuple(levels.tolist())), made)
+
+
+def filter_wind(
+    shaping_filter: ShapingFilter, levels: NDArray[np.float64], mean: NDArray[np.float64], scale: float = 1.0
+) -> RandomWind:
+    """Return the wind of a filter at levels.
+
+    Parameters
+    ----------
+    shaping_filter : ShapingFilter
+    levels : (k,) array
+        m.
+    mean : (k,) array
+        m/s.
+    scale : float
+        Factor on its standard deviation.
+    """
     bottom, n = float(shaping_filter.altitude[0]), shaping_filter.order
     wanted = np.maximum(levels, bottom)
     samples = shaping_filter.altitude
@@ -111,7 +131,5 @@ def _random_wind(case: Case, levels: NDArray[np.float64]) -> RandomWind:
         transition.append(Phi)
         added.append(Q)
     shape = (wanted.size - 1, n, n)
-    H = case.parameters["wind.sigma_scale"].value * shaping_filter.at(wanted)[2]
-    return RandomWind(
-        levels, mean_wind(case, levels), H, np.reshape(transition, shape), np.reshape(added, shape), start
-    )
+    H = scale * shaping_filter.at(wanted)[2]
+    return RandomWind(levels, mean, H, np.reshape(transition, shape), np.reshape(added, shape), start)

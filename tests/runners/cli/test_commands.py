@@ -36,6 +36,7 @@ TAKE_CHANGES = [
     ["gust", "as504"],
     ["fly", "as504", "wind.csv"],
     ["export", "as504", "--format", "c"],
+    ["availability", "as504", "--limit", "limit.csv"],
     ["day-of-launch", "as504", "--sounding", "wind.csv", "--hours-before", "3", "--limit", "limit.csv"],
     ["inspect", "as504", "--time", "70"],
     ["equations"],

@@ -34,6 +34,9 @@ UNUSED = [
     ([*APPLY, *SOUNDINGS, "--period", "may"], "--period is not used with --soundings"),
     ([*APPLY, *SOUNDINGS, "--edition", "2006"], "--edition is not used with --soundings"),
     (["wind", "stats", "--normality", "here"], "--normality is not used without --soundings"),
+    (["availability", "as504", "--limit", "l.csv", "--threshold", "0.1"], "--threshold is not used without --check"),
+    (["wind", "months", "--out", "here", "--site", "x"], "--site is not used without --soundings"),
+    (["wind", "months", "--out", "here", "--soundings", "s.csv", "--edition", "2006"], "--edition is not used with"),
     ([*LAUNCH, "--sign", "-1"], "--sign is not used without --component"),
     ([*LAUNCH, "--exponent", "1"], "--exponent is not used without --lasts"),
     ([*LAUNCH, "--lasts", "50", "--pairs", "p.csv"], "--pairs and --lasts both say"),
@@ -89,6 +92,10 @@ KNOWN = {
         "sounding", "hours_before", "limit", "window", "threshold", "error", "pairs", "lasts", "exponent", "sides",
         "component", "sign", "draws", "seed", "out", "changes",
     },
+    "availability": {
+        "limit", "months", "azimuths", "winds", "window", "check_hours", "threshold", "sides", "draws", "seed", "out",
+        "changes",
+    },
     "vehicles": set(),
     "new-vehicle": {"source"},
     "inspect": {"time", "json", "changes"},
@@ -109,6 +116,7 @@ KNOWN = {
         "levels", "months", "hours", "years", "latitude", "longitude", "point", "largest_gap", "incomplete", "outliers",
         "out",
     },
+    "wind months": {"out", "edition", "soundings", "site", "chosen"},
     "wind stats": {"period", "component", "edition", "top", "soundings", "normality"},
     "wind fit": {
         "period", "component", "edition", "top", "soundings", "method", "order", "noises", "time_limit", "out",

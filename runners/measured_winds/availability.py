@@ -1,0 +1,282 @@
+"""How often a month lets a vehicle fly: the chance that a flight passes its limits, by month and launch azimuth.
+
+The wind across the flight path towards azimuth Az is u cos Az - v sin Az, positive to the right. Its covariance is
+quadratic in the two weights, and goes into the responses by the weights of the levels. What deviations of the vehicle
+do goes with its mean response, so that every month and azimuth has its own mean. A check on the day of launch is
+simulated: of days drawn from the season some are stopped, those whose chance of passing given a sounding lies above the
+threshold.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from scipy.stats import chi2, norm
+
+from ...codegen.system.evaluation import MatrixEvaluator
+from ...model.errors import AscentwindWarning, ParameterValueError
+from ...model.system.names import WIND
+from ...model.tables import Table
+from ...model.wind.month_winds import MonthWind, read_months
+from ...model.wind.shaping_filter import ShapingFilter
+from ...model.wind.two_components import plane_weights
+from ..case.case import Case
+from ..case.climb import Climb
+from ..case.provenance import provenance
+from ..flight_load.limit_table import LimitError, Limits, limit_table
+from ..flight_load.load import DESIGN
+from ..flight_load.passage import LimitedLoad, Passage
+from ..flight_load.process import Grid, JointOutputs, joint_covariance
+from ..flight_load.request import checked_draws
+from ..flight_load.window import checked_window, window_chain
+from ..solvers.markov_chain import MarkovChain
+from ..solvers.time_nodes import interval_before
+from ..statistics.percentiles import Sides, checked_sides, instant_level
+from .conditioning import Measured
+from .day_of_launch import ERROR, worth_while
+from .level_weights import level_weights
+from .random_wind import RandomWind, filter_wind
+from .wind_field import WindField, default_persistence
+
+STEPS = 1200  # of the window
+COARSE = 8  # every so many are looked at, to see where passing is worth while
+MOST = 600  # points of time at which passing is computed
+SPACING = 25.0  # m, of the levels
+CONFIDENCE = 0.9  # of intervals by the statistics' own sampling
+BALLOON = 200.0  # m between levels of the sounding of a check
+DAYS, PATHS = 400, 1500  # drawn for a check
+CHECK_POINTS = 150  # of time, of a check
+
+
+def availability(
+    case: Case,
+    limits: str | Path | Limits,
+    months: Sequence[str] | None,
+    azimuths: Iterable[float] | None,
+    winds: str | Path | None,
+    window: tuple[float, float] | None,
+    check_hours: float | None,
+    threshold: float,
+    sides: Sides,
+    draws: int,
+    seed: int,
+) -> xr.Dataset:
+    """See :meth:`Study.availability`."""
+    checked_draws(draws, seed)
+    chosen, flown, table = checked_sides(sides), checked_window(case, window), limit_table(limits)
+    if not 0 < threshold < 1:
+        raise ParameterValueError(f"threshold = {threshold!r} is no probability; give one between 0 and 1")
+    if check_hours is not None and not 0 <= check_hours < np.inf:
+        raise ParameterValueError(f"a check {check_hours!r} h before launch; give hours of 0 or more")
+    if table.station is not None:
+        raise LimitError("is over stations of the structure; availability takes responses over time", file=table.file)
+    names = case.checked_responses(table.values)
+    units = [case.system.outputs[case.system.output_index(name)].unit for name in names]
+    for name, unit in zip(names, units, strict=True):
+        table.of(name, unit, np.array(flown))
+    record = case.vehicle_for("the availability of months").wind.record
+    if azimuths is None:
+        if record is None:
+            raise ParameterValueError("the vehicle does not state its azimuth; give azimuths")
+        azimuths = [record.azimuth]
+    angles = np.array([float(a) for a in azimuths])
+    if not angles.size or not np.isfinite(angles).all():
+        raise ParameterValueError("azimuths are finite numbers, rad from north towards east")
+    weights = [plane_weights(float(a), "yaw") for a in angles]
+    seasons = read_months(None if winds is None else Path(winds), None if months is None else list(months))
+
+    levels = _levels(case, flown, seasons)
+    at = [case.system.output_index(name) for name in names]
+    times = window_chain(case, flown, STEPS).times
+    by_level = level_weights(case, times.tolist(), levels, names)
+    others = [k for k, source in enumerate(case.system.sources) if source != WIND]
+    limit = np.stack([table.of(n, u, times)[:, 0] for n, u in zip(names, units, strict=True)], axis=1)
+    shape = (len(seasons), angles.size)
+    found = {key: np.full(shape, np.nan) for key in ("probability", "lower", "upper", "standard_error")}
+    found |= {key: np.full(shape, np.nan) for key in ("stopped", "remaining_risk")}
+    level = np.full((*shape, len(names)), np.nan)
+    for i, month in enumerate(seasons):
+        winds_of = [_wind(month, w, levels).covariance for w in ((1.0, 0.0), (0.0, 1.0), (1.0, 1.0))]
+        R = [winds_of[0], winds_of[1], winds_of[2] - winds_of[0] - winds_of[1]]
+        A = by_level.weight[::COARSE]
+        variances = [np.einsum("mrk,mrk->mr", A @ part, A) for part in R]
+        for j, (wu, wv) in enumerate(weights):
+            chain = window_chain(_in_mean(case, month, (wu, wv)), flown, STEPS)
+            row = chain.output[::COARSE][:, at]
+            vehicle = np.einsum("mri,mij,mrj->mr", row, chain.covariance(others)[::COARSE], row, optimize=True)
+            wind = np.maximum(wu**2 * variances[0] + wv**2 * variances[1] + wu * wv * variances[2], 0.0)
+            mean, bound = chain.mean[:, at], limit[::COARSE]
+            std = np.sqrt(wind + vehicle)
+            first, last = (COARSE * k for k in worth_while(mean[::COARSE], std, bound, chosen))
+            fine = np.arange(first, last + 1, max(1, -(-(last - first) // MOST)))
+            part = chain.part(slice(first, last + 1))
+            own = joint_covariance(part, part.output[:, at], others)[fine - first][:, :, fine - first]
+            F = by_level.weight[fine].reshape(fine.size * len(names), -1)
+            covariance = (F @ (wu**2 * R[0] + wv**2 * R[1] + wu * wv * R[2]) @ F.T).reshape(own.shape) + own
+            rough = _diffusion(case, month.filter_along((wu, wv)), part, fine - first, at, others)
+            process = JointOutputs(Grid(chain.times[fine], mean[fine], rough), covariance)
+            loads = [LimitedLoad(n, u) for n, u in zip(names, units, strict=True)]
+            p = Passage(case, loads, process, limit[fine], chosen, DESIGN, draws, seed).probability
+            found["probability"][i, j], found["standard_error"][i, j] = p.value, p.standard_error
+            low, high = _interval(mean[::COARSE], wind, vehicle, bound, chosen, month.independent_samples)
+            found["lower"][i, j], found["upper"][i, j] = min(1.0, p.value * low), min(1.0, p.value * high)
+            level[i, j] = instant_level(mean[::COARSE], std, DESIGN, chosen).max(axis=0)
+            if check_hours is not None:
+                some = fine[:: max(1, fine.size // CHECK_POINTS)]
+                which = np.searchsorted(fine, some)
+                found["stopped"][i, j], found["remaining_risk"][i, j] = _checked(
+                    WindField(_wind(month, (wu, wv), levels)), by_level.weight[some], mean[some],
+                    covariance[which][:, :, which], limit[some], chosen, check_hours, threshold,
+                    "zonal" if abs(wu) > abs(wv) else "meridional", seed,
+                )  # fmt: skip
+    meanings = {
+        "probability": "of passing any limit in a flight",
+        "lower": "lower end of its 90 % interval, by the statistics' own sampling",
+        "upper": "upper end of it",
+        "standard_error": "of the importance sampling",
+        "stopped": "share of days that a check on the day of launch stops",
+        "remaining_risk": "of passing any limit on the days that it lets go",
+    }
+    dims = ("month", "azimuth")
+    kept = [key for key in meanings if check_hours is not None or key not in ("stopped", "remaining_risk")]
+    return xr.Dataset(
+        {key: (dims, found[key], {"units": "1", "long_name": meanings[key]}) for key in kept}
+        | {
+            "level": (
+                (*dims, "response"),
+                level,
+                {"long_name": "largest of the flight's instants, passed with 0.00135"},
+            )
+        },
+        {
+            "month": [season.period for season in seasons],
+            "azimuth": ("azimuth", angles, {"units": "rad", "long_name": "of the launch, from north towards east"}),
+            "response": names,
+            "unit": ("response", units),
+        },
+        provenance(case)
+        | {"site": seasons[0].site, "edition": seasons[0].edition, "sides": chosen, "draws": draws, "seed": seed}
+        | ({} if check_hours is None else {"check_hours": check_hours, "threshold": threshold}),
+    )
+
+
+def _levels(case: Case, window: tuple[float, float], seasons: Sequence[MonthWind]) -> NDArray[np.float64]:
+    climb = Climb.of(case)
+    first, last = float(climb.altitudes[0]), float(climb.altitude(window[1]))
+    top = min(last, max(float(month.zonal.altitude[-1]) for month in seasons))
+    return np.linspace(first, max(top, first + 10 * SPACING), max(11, int(np.ceil((top - first) / SPACING)) + 1))
+
+
+def _wind(month: MonthWind, weights: tuple[float, float], levels: NDArray[np.float64]) -> RandomWind:
+    return filter_wind(month.filter_along(weights), levels, month.mean_along(weights, levels))
+
+
+def _in_mean(case: Case, month: MonthWind, weights: tuple[float, float]) -> Case:
+    """Return a case whose mean wind is a month's: what deviations of the vehicle do goes with its mean response."""
+    wind = case.vehicle_for("the availability of months").wind
+    old = wind.mean
+    mean = Table(old.name, old.unit, old.argument, month.mean_along(weights, old.argument), old.interpolation)
+    with warnings.catch_warnings():
+        warnings.simplefilter(
+            "ignore", AscentwindWarning
+        )  # of winds that end below the flight, known since it was loaded
+        return case.with_wind(replace(wind, mean=mean, standard_deviation=None, record=None))
+
+
+def _diffusion(
+    case: Case,
+    shaping_filter: ShapingFilter,
+    part: MarkovChain,
+    picked: NDArray[np.intp],
+    rows: list[int],
+    others: list[int],
+) -> NDArray[np.float64]:
+    """Return what white noise does to outputs directly, that of the month's wind and of the vehicle, (m, r)."""
+    climb, times = Climb.of(case), part.times[picked]
+    altitude = climb.altitude(times)
+    held = np.clip(altitude, shaping_filter.altitude[0], shaping_filter.altitude[-1])
+    _, G, H = shaping_filter.at(held)
+    roughness = np.sqrt(np.maximum((np.einsum("kn,knm->km", H, G) ** 2).sum(axis=1) * climb.polynomial(times, 1), 0.0))
+    evaluate, wind = MatrixEvaluator(case.with_means, ("G",)), case.system.input_names.index(WIND)
+    through = []
+    for time in times.tolist():
+        here = interval_before(case.with_means, time) if time > case.system.start else None
+        low, high = (time, time) if here is None else (here.low, here.high)
+        through.append(evaluate(time, low, high)[0][rows, wind])
+    by_wind = np.array(through) * roughness[:, None]
+    direct = part.output[picked][:, rows] @ part.acting_noise_matrix(others)[picked]
+    size = np.sqrt(by_wind**2 + (direct**2).sum(axis=2))
+    return np.where(by_wind < 0, -size, size)
+
+
+def _interval(
+    mean: NDArray, wind: NDArray, vehicle: NDArray, limit: NDArray, sides: Sides, samples: float
+) -> tuple[float, float]:
+    """Return the factors on a probability that the sampling of the wind's statistics leaves open.
+
+    By the change of the sum of all instants' chances: the wind's variance is chi-square with samples - 1 degrees of
+    freedom, its mean load normal with variance wind / samples; both are independent and taken together by the root sum
+    square of the logarithms.
+    """
+
+    def chance(scale: float, shift: float) -> float:
+        std = np.sqrt(scale * wind + vehicle)
+        unit = np.where(std > 0, std, np.inf)
+        moved = mean + shift * np.sign(mean) * np.sqrt(wind / samples)
+        upper = norm.logsf((limit - moved) / unit) if sides != "lower" else np.full(mean.shape, -np.inf)
+        lower = norm.logsf((limit + moved) / unit) if sides != "upper" else np.full(mean.shape, -np.inf)
+        return float(np.logaddexp.reduce(np.logaddexp(upper, lower), axis=None))
+
+    nu, tail, here = samples - 1, 0.5 * (1 - CONFIDENCE), chance(1.0, 0.0)
+    z = float(norm.ppf(1 - tail))
+    ends = []
+    for sign, quantile in ((-1, 1 - tail), (1, tail)):
+        by_variance = chance(nu / float(chi2.ppf(quantile, nu)), 0.0) - here
+        by_mean = chance(1.0, sign * z) - here
+        ends.append(float(np.exp(sign * np.hypot(by_variance, by_mean))))
+    return ends[0], ends[1]
+
+
+def _checked(
+    field: WindField,
+    weight: NDArray[np.float64],
+    mean: NDArray[np.float64],
+    covariance: NDArray[np.float64],
+    limit: NDArray[np.float64],
+    sides: Sides,
+    hours: float,
+    threshold: float,
+    component: str,
+    seed: int,
+) -> tuple[float, float]:
+    """Return the share of days that a check stops, and the chance of passing on the others, by drawn days."""
+    random, (m, r, _) = np.random.default_rng([seed, 12]), weight.shape
+    altitude = np.arange(field.levels[0] + BALLOON, field.levels[-1], BALLOON)
+    rows = field.rows(altitude)
+    persistence = default_persistence(field, component)
+    now = rows * persistence.correlation(field.wavelengths, hours)
+    K = Measured(rows @ rows.T + ERROR**2 * np.eye(altitude.size))
+    gain = K.whitened((field.waves @ now.T).T @ weight.reshape(m * r, -1).T)
+    left = covariance.reshape(m * r, m * r) - gain.T @ gain
+    size = np.sqrt(np.maximum(np.diagonal(left), 0.0))
+    unit = np.where(size > 0, size, 1.0)
+    values, vectors = np.linalg.eigh(left / np.outer(unit, unit))
+    root = size[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
+    flights = random.standard_normal((PATHS, m * r)) @ root.T
+    days = mean.ravel() + random.standard_normal((DAYS, altitude.size)) @ gain
+    bound, chance = limit.ravel(), np.empty(DAYS)
+    for k, day in enumerate(days):
+        beyond = np.zeros(PATHS, bool)
+        if sides != "lower":
+            beyond |= (flights > bound - day).any(axis=1)
+        if sides != "upper":
+            beyond |= (flights < -bound - day).any(axis=1)
+        chance[k] = beyond.mean()
+    go = chance <= threshold
+    return float(1 - go.mean()), float(chance[go].mean()) if go.any() else float("nan")

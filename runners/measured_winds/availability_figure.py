@@ -1,0 +1,77 @@
+"""Figures of availability: the chance of passing a limit by month and azimuth, and the load over the compass."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from matplotlib import colormaps, rc_context
+from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
+from matplotlib.projections.polar import PolarAxes
+
+from ..present.style import STYLE, display, words, wrapped
+
+LEAST = 1e-6
+
+
+def availability_figure(found: xr.Dataset, title: str) -> Figure:
+    """Return a heat map of the chance of passing any limit.
+
+    Parameters
+    ----------
+    found : Dataset
+        As :meth:`Study.availability` returns it.
+    title : str
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    p = np.maximum(found["probability"].values, LEAST)
+    months, angles = [str(m) for m in found["month"].values], np.degrees(found["azimuth"].values)
+    with rc_context(STYLE | {"axes.grid": False}):
+        figure = Figure(figsize=(2.5 + 0.75 * max(angles.size, 4), 1.8 + 0.42 * len(months)), layout="constrained")
+        axes = figure.subplots()
+        image = axes.imshow(p, aspect="auto", cmap="YlOrRd", norm=LogNorm(min(p.min(), 1e-4), max(p.max(), 1e-2)))
+        for i, j in np.ndindex(*p.shape):
+            shade = image.norm(p[i, j])
+            axes.text(j, i, f"{found['probability'].values[i, j]:.1g}", ha="center", va="center", fontsize=8,
+                      color="white" if shade > 0.65 else "black")  # fmt: skip
+        axes.set_xticks(range(angles.size), [f"{a:.4g}" for a in angles])
+        axes.set_yticks(range(len(months)), months)
+        axes.set(xlabel="launch azimuth (deg)")
+        figure.colorbar(image, label="flights that pass a limit")
+        figure.suptitle(wrapped(title), fontsize=11)
+    return figure
+
+
+def load_rose(found: xr.Dataset, response: str, title: str) -> Figure:
+    """Return the largest level of a response over the azimuths, by month, on a compass.
+
+    Parameters
+    ----------
+    found : Dataset
+    response : str
+    title : str
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    values = found["level"].sel(response=response).values
+    factor, unit = display(str(found["unit"].sel(response=response).values), values)
+    months, angles = [str(m) for m in found["month"].values], found["azimuth"].values
+    colors = colormaps["turbo"](np.linspace(0.05, 0.95, len(months)))
+    with rc_context(STYLE):
+        figure = Figure(figsize=(7.5, 6.5), layout="constrained")
+        axes = figure.add_subplot(projection="polar")
+        assert isinstance(axes, PolarAxes)
+        axes.set_theta_zero_location("N")
+        axes.set_theta_direction(-1)
+        for row, month, color in zip(values, months, colors, strict=True):
+            axes.plot(angles, factor * row, "o-", ms=3, lw=1.4, color=color, label=month)
+        axes.set_rlim(0)
+        axes.legend(loc="center left", bbox_to_anchor=(1.08, 0.5), fontsize=8)
+        told = f"{title}\n{words(response)} ({unit}): largest level passed with 0.00135 at an instant"
+        axes.set_title(wrapped(told), fontsize=10)
+    return figure
