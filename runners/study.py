@@ -727,7 +727,7 @@ class Study(Case):
         draws: int = DRAWS,
         seed: int = 0,
     ) -> xr.Dataset:
-        """Return the chance that a flight passes its limits, by month and launch azimuth, in the yaw plane.
+        """Return the chance that a flight passes its limits, by month and launch azimuth, in the vehicle's plane.
 
         Parameters
         ----------

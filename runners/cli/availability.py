@@ -93,11 +93,13 @@ def availability(
         write_whole(job.folder / "availability.csv", lambda path: path.write_text(text, encoding="utf-8"))
     )
     title = study.vehicle_for("availability").title
-    heading = f"{title}\nYaw plane, winds of {found.attrs['site']}"
+    heading = f"{title}\n{found.attrs['plane'].capitalize()} plane, winds of {found.attrs['site']}"
     job.written += write_figure(availability_figure(found, heading), job.folder, "availability")
     for name in found["response"].values:
         job.written += write_figure(load_rose(found, str(name), heading), job.folder, f"rose_{name}")
-    table = Table("month", title=f"Flights that pass a limit, yaw plane, winds of {found.attrs['site']}")
+    table = Table(
+        "month", title=f"Flights that pass a limit, {found.attrs['plane']} plane, winds of {found.attrs['site']}"
+    )
     shown = found["azimuth"].values
     for angle in shown:
         table.add_column(f"{np.degrees(angle):.4g}°", justify="right", no_wrap=True)

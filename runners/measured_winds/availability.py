@@ -1,10 +1,10 @@
 """How often a month lets a vehicle fly: the chance that a flight passes its limits, by month and launch azimuth.
 
-The wind across the flight path towards azimuth Az is u cos Az - v sin Az, positive to the right. Its covariance is
-quadratic in the two weights, and goes into the responses by the weights of the levels. What deviations of the vehicle
-do goes with its mean response, so that every month and azimuth has its own mean. A check on the day of launch is
-simulated: of days drawn from the season some are stopped, those whose chance of passing given a sounding lies above the
-threshold.
+The wind across the flight path towards azimuth Az is u cos Az - v sin Az in the yaw plane, positive to the right, and
+along the heading, u sin Az + v cos Az, in the pitch plane, which takes its own part of it. Its covariance is quadratic
+in the two weights, and goes into the responses by the weights of the levels. What deviations of the vehicle do goes
+with its mean response, so that every month and azimuth has its own mean. A check on the day of launch is simulated: of
+days drawn from the season some are stopped, those whose chance of passing given a sounding lies above the threshold.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from ...codegen.system.evaluation import MatrixEvaluator
 from ...model.errors import AscentwindWarning, ParameterValueError
 from ...model.system.names import WIND
 from ...model.tables import Table
+from ...model.vehicle.planes import one_wind
 from ...model.wind.month_winds import MonthWind, read_months
 from ...model.wind.shaping_filter import ShapingFilter
 from ...model.wind.two_components import plane_weights
@@ -80,7 +81,8 @@ def availability(
     units = [case.system.outputs[case.system.output_index(name)].unit for name in names]
     for name, unit in zip(names, units, strict=True):
         table.of(name, unit, np.array(flown))
-    record = case.vehicle_for("the availability of months").wind.record
+    vehicle = case.vehicle_for("the availability of months")
+    record = one_wind(vehicle, "the availability of months").record
     if azimuths is None:
         if record is None:
             raise ParameterValueError("the vehicle does not state its azimuth; give azimuths")
@@ -88,7 +90,7 @@ def availability(
     angles = np.array([float(a) for a in azimuths])
     if not angles.size or not np.isfinite(angles).all():
         raise ParameterValueError("azimuths are finite numbers, rad from north towards east")
-    weights = [plane_weights(float(a), "yaw") for a in angles]
+    weights = [plane_weights(float(a), vehicle.file.planes) for a in angles]
     seasons = read_months(None if winds is None else Path(winds), None if months is None else list(months))
 
     levels = _levels(case, flown, seasons)
@@ -109,10 +111,10 @@ def availability(
         for j, (wu, wv) in enumerate(weights):
             chain = window_chain(_in_mean(case, month, (wu, wv)), flown, STEPS)
             row = chain.output[::COARSE][:, at]
-            vehicle = np.einsum("mri,mij,mrj->mr", row, chain.covariance(others)[::COARSE], row, optimize=True)
+            own_variance = np.einsum("mri,mij,mrj->mr", row, chain.covariance(others)[::COARSE], row, optimize=True)
             wind = np.maximum(wu**2 * variances[0] + wv**2 * variances[1] + wu * wv * variances[2], 0.0)
             mean, bound = chain.mean[:, at], limit[::COARSE]
-            std = np.sqrt(wind + vehicle)
+            std = np.sqrt(wind + own_variance)
             first, last = (COARSE * k for k in worth_while(mean[::COARSE], std, bound, chosen))
             fine = np.arange(first, last + 1, max(1, -(-(last - first) // MOST)))
             part = chain.part(slice(first, last + 1))
@@ -124,7 +126,7 @@ def availability(
             loads = [LimitedLoad(n, u) for n, u in zip(names, units, strict=True)]
             p = Passage(case, loads, process, limit[fine], chosen, DESIGN, draws, seed).probability
             found["probability"][i, j], found["standard_error"][i, j] = p.value, p.standard_error
-            low, high = _interval(mean[::COARSE], wind, vehicle, bound, chosen, month.independent_samples)
+            low, high = _interval(mean[::COARSE], wind, own_variance, bound, chosen, month.independent_samples)
             found["lower"][i, j], found["upper"][i, j] = min(1.0, p.value * low), min(1.0, p.value * high)
             level[i, j] = instant_level(mean[::COARSE], std, DESIGN, chosen).max(axis=0)
             if check_hours is not None:
@@ -161,7 +163,14 @@ def availability(
             "unit": ("response", units),
         },
         provenance(case)
-        | {"site": seasons[0].site, "edition": seasons[0].edition, "sides": chosen, "draws": draws, "seed": seed}
+        | {
+            "plane": vehicle.file.planes,
+            "site": seasons[0].site,
+            "edition": seasons[0].edition,
+            "sides": chosen,
+            "draws": draws,
+            "seed": seed,
+        }
         | ({} if check_hours is None else {"check_hours": check_hours, "threshold": threshold}),
     )
 
@@ -179,7 +188,7 @@ def _wind(month: MonthWind, weights: tuple[float, float], levels: NDArray[np.flo
 
 def _in_mean(case: Case, month: MonthWind, weights: tuple[float, float]) -> Case:
     """Return a case whose mean wind is a month's: what deviations of the vehicle do goes with its mean response."""
-    wind = case.vehicle_for("the availability of months").wind
+    wind = one_wind(case.vehicle_for("the availability of months"), "the availability of months")
     old = wind.mean
     mean = Table(old.name, old.unit, old.argument, month.mean_along(weights, old.argument), old.interpolation)
     with warnings.catch_warnings():

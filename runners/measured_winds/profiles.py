@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...model.errors import DataError, UnknownNameError
+from ...model.vehicle.planes import one_wind
 from ...model.wind.record import COMPONENTS
 from ...model.wind.soundings.collection import Soundings
 from ...model.wind.soundings.quality import Quality
@@ -60,7 +61,7 @@ def across(case: Case, component: str | None, sign: int) -> tuple[str, int]:
     DataError, UnknownNameError
     """
     vehicle = case.vehicle_for("a measured wind")
-    record = vehicle.wind.record
+    record = one_wind(vehicle, "a measured wind").record
     if component is None:
         if record is None:
             raise DataError(

@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from ...model.vehicle.planes import one_wind
 from ...model.wind.propagation import SPACING, transitions
 from ...model.wind.shaping_filter import ShapingFilter
 from ..case.case import Case
@@ -87,7 +88,7 @@ def random_wind(case: Case, levels: NDArray[np.float64]) -> RandomWind:
     ------
     NoVehicleError
     """
-    shaping_filter = case.vehicle_for("a random wind").wind.shaping_filter
+    shaping_filter = one_wind(case.vehicle_for("a random wind"), "a random wind").shaping_filter
 
     def made() -> RandomWind:
         scale = case.parameters["wind.sigma_scale"].value

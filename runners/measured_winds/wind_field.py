@@ -17,6 +17,7 @@ from scipy.fft import dct
 from scipy.optimize import brentq, least_squares
 
 from ...model.errors import ParameterValueError
+from ...model.vehicle.planes import one_wind
 from ...model.wind.soundings.collection import Soundings
 from ...model.wind.soundings.sounding import SoundingError
 from ..case.case import Case
@@ -94,7 +95,7 @@ def wind_field(case: Case, last: float) -> WindField:
     NoVehicleError
     """
     first = float(Climb.of(case).altitudes[0])
-    shaping_filter = case.vehicle_for("a random wind").wind.shaping_filter
+    shaping_filter = one_wind(case.vehicle_for("a random wind"), "a random wind").shaping_filter
     bottom = max(first, float(shaping_filter.altitude[0]))
     top = min(max(last, bottom + 10 * SPACING), max(float(shaping_filter.altitude[-1]), bottom + 10 * SPACING))
     count = min(MOST, int(np.ceil((top - bottom) / SPACING)) + 1)

@@ -42,7 +42,7 @@ def test_files_of_availability(cache, tmp_path, monkeypatch, capsys):
     ("more", "says"),
     [
         (["--months", "13"], "no month '13'"),
-        (["--months", "juni"], "did you mean 'june'"),
+        (["--months", "juli"], "did you mean 'july'"),
         (["--azimuths", "40;120"], "names no azimuths"),
         (["--winds", "nowhere"], "holds no month"),
     ],

@@ -111,7 +111,7 @@ KNOWN = {
     "design": {"out", "trades", "changes"},
     "reproduce": {"out"},
     "build-vehicle": {"out", "figures", "spacing"},
-    "wind apply": {"component", "azimuth", "sign", "period", "edition", "soundings", "site"},
+    "wind apply": {"component", "components", "azimuth", "sign", "period", "edition", "soundings", "site"},
     "wind read": {
         "levels", "months", "hours", "years", "latitude", "longitude", "point", "largest_gap", "incomplete", "outliers",
         "out",
