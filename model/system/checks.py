@@ -234,8 +234,8 @@ def check_symbols(
             name = next(name for i, name in enumerate(names) if _calls(column[i]))
             raise SystemDefinitionError(
                 f"{where}: the {what} '{name}' calls a function (casadi.interpolant, external code), "
-                "which has no C form here; write it with arithmetic, elementary functions and if_else, or make it a "
-                "table of the system"
+                "which has no C form here; write it with arithmetic, elementary functions and if_else, or give its "
+                "rows in tables={'name': (symbol, times, values)}"
             )
 
 

@@ -8,15 +8,18 @@ The equations stand once, as CasADi expressions linear in x, w and u; the matric
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
+from typing import Self
 
 import casadi as ca
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..errors import DirectNoiseError, NonlinearSystemError, SystemDefinitionError, TimeRangeError, UnknownNameError
-from ..tables import TableGroup
+from ..tables import Table, TableGroup
+from .arrays import parts_from_arrays
 from .checks import (
     check_covariance,
     check_entries,
@@ -51,6 +54,8 @@ class LinearSystem:
         The known inputs as functions of time, p and v, shape (n_u,).
     tables : tuple of TableGroup
         Their values, group by group, are v.
+    rows : tuple of Table
+        Those of the tables that were given as rows over time, of which a sensitivity tells the derivative of each.
     start_covariance : mapping of source to (n, n) SX or array
         Covariance P0 of the states at the start that a source brings; a function of p. Missing means zero.
     discontinuities : tuple of float
@@ -98,6 +103,94 @@ class LinearSystem:
     end: float = float("inf")
     coupling_matrix: ca.SX | None = None
     structure: Mapping[str, str] = field(default_factory=dict)
+    rows: tuple[Table, ...] = ()
+
+    @classmethod
+    def from_arrays(
+        cls,
+        times: ArrayLike,
+        A: ArrayLike,
+        B: ArrayLike,
+        C: ArrayLike,
+        D: ArrayLike | None = None,
+        E: ArrayLike | None = None,
+        G: ArrayLike | None = None,
+        *,
+        u: ArrayLike | None = None,
+        name: str = "system",
+        names: Mapping[str, Sequence[str]] | None = None,
+        sources: Mapping[str, str] | None = None,
+        units: Mapping[str, str] | None = None,
+        scales: Mapping[str, float] | None = None,
+        start_covariance: Mapping[str, np.ndarray] | None = None,
+        discontinuities: Sequence[float] = (),
+        interpolation: str = "linear",
+    ) -> Self:
+        """Make a system of matrices that are numbers over time.
+
+        An entry that is constant is a parameter of the system, one that varies a table of it, both named such as
+        'A(3,5)': third row, fifth column. One that is always zero is none of it.
+
+        Parameters
+        ----------
+        times : (k,) array
+            s, from the start to the end of the system. A time that stands twice is a jump; integrators stop there.
+        A : (k, n, n) or (n, n) array
+            Each array over the times or constant; of NumPy, or of xarray with dimensions in this order.
+        B : (k, n, n_w) or (n, n_w) array
+        C : (k, n_y, n) or (n_y, n) array
+        D : (k, n_y, n_w) or (n_y, n_w) array, optional
+        E : (k, n, n_u) or (n, n_u) array, optional
+        G : (k, n_y, n_u) or (n_y, n_u) array, optional
+        u : (k, n_u) or (n_u,) array, optional
+            Known inputs, which make the mean; ones without it.
+        name : str
+        names : mapping of 'states', 'noises', 'outputs' and 'inputs' to names, optional
+            Without them the labels of arrays of xarray, else x1, w1, y1, u1 and so on.
+        sources : mapping of noise name to source, optional
+            Without it every noise is a source of its own.
+        units : mapping by state, output or input name, optional
+        scales : mapping by state or output name, optional
+            Typical sizes, by which integrators weigh errors.
+        start_covariance : mapping of source to (n, n) array, optional
+        discontinuities : sequence of float
+            Times between two rows at which matrices jump, s; rows on either side are carried on to them.
+        interpolation : {'linear', 'cubic', 'pchip', 'step'}
+            Straight lines, whose kinks integrators stop at; not-a-knot cubic splines; monotone cubics; or the value of
+            the row before.
+
+        Returns
+        -------
+        LinearSystem
+
+        Raises
+        ------
+        SystemDefinitionError
+            Arrays that do not fit each other, with all that are at fault; times that decrease; numbers that are none.
+        UnknownNameError
+            A name that nothing carries.
+
+        Examples
+        --------
+        >>> import ascentwind as aw
+        >>> lag = aw.LinearSystem.from_arrays([0, 10], A=[[-0.5]], B=[[1.0]], C=[[1.0]], names={"outputs": ["lag"]})
+        >>> [p.name for p in lag.parameters]
+        ['A(1,1)', 'B(1,1)', 'C(1,1)']
+        """
+        parts = parts_from_arrays(
+            times,
+            {"A": A, "B": B, "C": C, "D": D, "E": E, "G": G},
+            u,
+            name=name,
+            names=names,
+            sources=sources,
+            units=units,
+            scales=scales,
+            start_covariance=start_covariance,
+            discontinuities=discontinuities,
+            interpolation=interpolation,
+        )
+        return cls(**parts)
 
     def __repr__(self) -> str:
         counts = {

@@ -1,4 +1,4 @@
-"""From densities over time to the rows of a vehicle's tables.
+"""From densities over time to the rows of tables.
 
 A table is a cubic in each interval between knots, so that all a row needs of a density are its moments in the
 intervals, the integrals of the density times 1, u, u^2, u^3 with u from the left knot. The cubics of a unit vector
@@ -40,10 +40,15 @@ def vehicle_rows(vehicle: Vehicle) -> dict[str, Table]:
     return {t.name: t for t in (*vehicle.tables.values(), *wind.means, *wind.shaping_filter.tables())}
 
 
+def table_rows(case: Case) -> dict[str, Table]:
+    """Return the tables of a case with rows of their own: a vehicle's, or those that a system was given."""
+    return {t.name: t for t in case.system.rows} if case.vehicle is None else vehicle_rows(case.vehicle)
+
+
 def knot_sensitivities(
     case: Case, pair: AdjointPair, total: TotalDensity, start: StartShare | None, value: float | None
 ) -> Parts:
-    """Return the derivative with respect to every row of every table of a vehicle; nothing without a vehicle.
+    """Return the derivative with respect to every row of every table; nothing where none has rows.
 
     A row of the altitude moves the rate of climb and, through the wind's tables, the wind that is met.
 
@@ -55,9 +60,9 @@ def knot_sensitivities(
     value : float or None
         Of the quantity; None leaves elasticities out.
     """
-    if case.vehicle is None:
+    groups, rows = case.with_means.groups, table_rows(case)
+    if not rows:
         return {}, {}
-    groups, rows = case.with_means.groups, vehicle_rows(case.vehicle)
     names = [name for group in groups for name in group.names]
     moments: dict[str, NDArray] = {}
     first = 0
@@ -75,13 +80,14 @@ def knot_sensitivities(
         first = last
     if start is not None:
         _add_start(groups, start, case.system.start, moments)
-    for name, of in RATES.items():  # the slope of an altitude: c1 + 2 c2 u + 3 c3 u^2
-        if name in moments:
-            moments[of] = moments[of].copy()
-            moments[of][:, 1:] += np.arange(1, ORDER) * moments[name][:, :-1]
-    if MET_ALTITUDE in moments:  # the sum of both
-        for name in ("altitude", AHEAD):
-            moments[name] = moments[name] + moments[MET_ALTITUDE]
+    if case.vehicle is not None:
+        for name, of in RATES.items():  # the slope of an altitude: c1 + 2 c2 u + 3 c3 u^2
+            if name in moments:
+                moments[of] = moments[of].copy()
+                moments[of][:, 1:] += np.arange(1, ORDER) * moments[name][:, :-1]
+        if MET_ALTITUDE in moments:  # the sum of both
+            for name in ("altitude", AHEAD):
+                moments[name] = moments[name] + moments[MET_ALTITUDE]
     knots_of = {name: group.knots for group in groups for name in group.names}
     alike: dict[tuple, list[str]] = {}
     for name, table in rows.items():
