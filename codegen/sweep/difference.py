@@ -69,7 +69,9 @@ def _difference_at(sweep: CompiledSweep, numbers: NominalNumbers, time: float) -
     difference = [
         _apart(found.transition[0] / scale[:, None] * scale, Phi / scale[:, None] * scale - np.eye(n), np.eye(n)),
         *(_apart(a / np.outer(scale, scale), b / np.outer(scale, scale)) for a, b in zip(state, P, strict=True)),
-        *(_apart(np.diag(a), b) for a, b in zip(found.covariance[0], variance, strict=True)),
+        # of its own P, held against ours above: where noise reaches a response through many states, its variance from
+        # rest grows as a power of time that neither formula integrates exactly
+        *(_apart(np.diag(a), np.diag(C @ P @ C.T)) for a, P in zip(found.covariance[0], state, strict=True)),
         _apart(means[1] / scale, m / scale),
         _apart(outputs[1], response),
         _apart(found.mean[0], response),
