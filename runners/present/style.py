@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from textwrap import fill
+from textwrap import wrap
 from typing import Any
 
 import numpy as np
@@ -53,8 +53,14 @@ def display(unit: str, values: ArrayLike) -> tuple[float, str]:
 
 
 def wrapped(title: str) -> str:
-    """Return a title with its long lines broken, so that they stay on the figure."""
-    return "\n".join(fill(line, TITLE_WIDTH) for line in title.splitlines())
+    """Return a title with its long lines broken, so that they stay on the figure, into parts of nearly equal length."""
+    return "\n".join("\n".join(_parts(line)) for line in title.splitlines())
+
+
+def _parts(line: str) -> list[str]:
+    longest = wrap(line, TITLE_WIDTH)
+    widths = range(max(map(len, line.split()), default=1), TITLE_WIDTH)
+    return next((parts for width in widths if len(parts := wrap(line, width)) == len(longest)), longest)
 
 
 def words(name: str) -> str:
@@ -67,6 +73,8 @@ def write_figure(figure: Figure, folder: Path, name: str) -> list[Path]:
     name = file_name(name)
     _take_dollars_as_written(figure)
     with rc_context(STYLE):
+        figure.draw_without_rendering()
+        figure.set_layout_engine("none")  # what it has found holds for both files; each would look for it twice
         return [
             write_whole(folder / f"{name}.png", lambda p: figure.savefig(p, dpi=150)),
             write_whole(folder / f"{name}.svg", lambda p: figure.savefig(p, metadata={"Date": None})),
