@@ -12,6 +12,7 @@ __getattr__, __dir__, __all__ = _lazy.attach(
     submod_attrs={
         "model.system.define": ["define_system"],
         "model.system.linear_system": ["LinearSystem"],
+        "model.system.system_file": ["read_system"],
         "model.vehicle.reader": ["load_vehicle"],
         "model.wind.soundings.read": ["read_profiles", "read_soundings"],
         "runners.construct.build_vehicle": ["build_vehicle"],

@@ -1,6 +1,7 @@
 from . import errors as errors
 from .model.system.define import define_system as define_system
 from .model.system.linear_system import LinearSystem as LinearSystem
+from .model.system.system_file import read_system as read_system
 from .model.vehicle.reader import load_vehicle as load_vehicle
 from .model.wind.soundings.read import read_profiles as read_profiles
 from .model.wind.soundings.read import read_soundings as read_soundings

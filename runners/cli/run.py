@@ -13,7 +13,8 @@ from ...model.errors import AscentwindError, UnusedOptionError
 from ..present.terminal import console, errors
 from .flight_load import print_levels
 from .job import SHOWN, Job, load_study, steps
-from .terminal import Changes, Turbulence, VehicleArgument, number, parse_changes, results_folder
+from .system import run_system
+from .terminal import Changes, Turbulence, number, parse_changes, results_folder
 
 if TYPE_CHECKING:
     from ..flight_load.load import FlightLoad
@@ -25,7 +26,9 @@ if TYPE_CHECKING:
 
 
 def run(
-    vehicle: VehicleArgument,
+    vehicle: Annotated[
+        str | None, typer.Argument(help="A shipped vehicle ('ascentwind vehicles') or a vehicle folder.")
+    ] = None,
     times: Annotated[str | None, typer.Option(help="End times in s: START:STOP:STEP or T1,T2,...")] = None,
     out: Annotated[Path | None, typer.Option(help="Folder for results; VEHICLE-results without it.")] = None,
     engine: Annotated[
@@ -51,11 +54,17 @@ def run(
         str | None,
         typer.Option(help="Loads along the vehicle at this time (s, or 'peak'), and its envelope."),
     ] = None,
+    system: Annotated[
+        Path | None,
+        typer.Option(help="A system of one's own in the place of a vehicle: the TOML file of its matrices."),
+    ] = None,
 ) -> None:
     """Mean, variance and |mean| + 3 sigma of all responses over flight time: tables and figures.
 
     Every peak is computed again by CVODES, one adjoint run back from it; exit code 1 when they disagree.
     """
+    if vehicle is None and system is None:
+        raise typer.BadParameter("name a vehicle, or a system of one's own with --system FILE.toml")
     from ...model.equations.stated_twice import compare_stated_twice
     from ..case.times import parse_times
     from ..flight_load.files import with_flight_levels
@@ -72,8 +81,16 @@ def run(
     from ..views.azimuth_sweep import check_turns, checked_azimuths
 
     chances = checked_probabilities(probability) if probability else ()
-    turns = checked_azimuths(parse_times(azimuths)) if azimuths else []
     settings = {"method": method, "relative_tolerance": tolerance}
+    if system is not None:
+        of_vehicle = {
+            "VEHICLE": vehicle, "--set": changes, "--turbulence": turbulence, "--azimuths": azimuths,
+            "--along-vehicle": along_vehicle,
+        }  # fmt: skip
+        run_system(system, times, out, engine_from(engine, **settings), tuple(chances), of_vehicle)
+        return
+    assert vehicle is not None
+    turns = checked_azimuths(parse_times(azimuths)) if azimuths else []
     engine_from(engine, **settings)  # refused before anything is computed
     if times and "default_times" in parse_changes(changes or []):
         raise UnusedOptionError("--set default_times is not used with --times; leave one of them out")

@@ -80,7 +80,10 @@ UNUSED = [
 
 # Options of every command: an option that is not here must be looked at, whether some other one makes it idle
 KNOWN = {
-    "run": {"times", "out", "engine", "method", "tolerance", "turbulence", "changes", "along_vehicle", "probability"},
+    "run": {
+        "system", "times", "out", "engine", "method", "tolerance", "turbulence", "changes", "along_vehicle",
+        "probability", "azimuths",
+    },
     "flight-load": {
         "window", "response", "probability", "limit", "sides", "sensitivity", "wind_error", "draws", "seed", "out",
         "turbulence", "changes",
