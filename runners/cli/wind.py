@@ -18,6 +18,8 @@ from .terminal import Changes, VehicleArgument, given, number, refuse_unused, wh
 
 if TYPE_CHECKING:
     from ...model.wind.shaping_filter import ShapingFilter
+    from ...model.wind.soundings.collection import Soundings as MeasuredWinds
+    from ...model.wind.statistics import TwoComponentStatistics
 
 wind = typer.Typer(no_args_is_help=True, help="Wind statistics, and filters that turn white noise into that wind.")
 wind.command()(read)
@@ -56,9 +58,7 @@ def _statistics(
         return shipped_statistics(period, component, edition=edition, top=top)
     refuse_unused(context, ["period", "edition"], "with --soundings, whose days the statistics are of")
     read = read_soundings(soundings)
-    partly = int((~read.complete).sum())
-    if partly:
-        console.print(f"{partly} of {len(read.u)} profiles lack levels and count where they are", style="dim")
+    _say_incomplete(read)
     found = getattr(read.statistics(soundings.stem, site), component)
     return found.between(-math.inf, top) if given(context, "top") else found
 
@@ -111,7 +111,16 @@ def apply(
     period: Period = "march",
     edition: Edition = "1983",
     soundings: Soundings = None,
-    site: Annotated[str | None, typer.Option(help="Of the soundings.")] = None,
+    site: Annotated[str | None, typer.Option(help="Of the soundings or the matrix.")] = None,
+    matrix: Annotated[
+        Path | None, typer.Option(help="CSV of means and a covariance matrix, of one component or both.")
+    ] = None,
+    samples: Annotated[
+        float | None, typer.Option(parser=number, help="Independent soundings behind the matrix.")
+    ] = None,
+    repair: Annotated[
+        bool, typer.Option("--repair", help="The nearest valid correlations where no wind has the matrix's.")
+    ] = False,
 ) -> None:
     """Give a vehicle a wind: filter, mean, standard deviation and record together."""
     from ...model.errors import UnknownNameError
@@ -127,17 +136,34 @@ def apply(
         )
     if soundings is not None and site is None:
         raise DataError("soundings do not say where they were taken; give --site")
+    if matrix is None:
+        refuse_unused(context, ["samples", "repair"], "without --matrix")
     across = flight_azimuth(folder, azimuth)
     if components is not None:
         refuse_unused(context, ["component", "sign"], "with --components, which are taken as they blow")
         if components != "both":
             raise UnknownNameError("choice of components", components, ["both"])
-        _apply_both(context, folder, across, period, edition, soundings, site)
+        both = (
+            _two_components(context, period, edition, soundings, site)
+            if matrix is None
+            else _of_matrix(context, matrix, site, period, samples, repair)
+        )
+        if isinstance(both, dict):
+            raise DataError(f"holds the {next(iter(both))} component alone; leave --components out", file=matrix)
+        where = _where(period, edition, soundings, site, matrix, samples)
+        _apply_both(folder, across, both, where)
         return
     if component is None:
         raise DataError("it is not said which wind: give --component zonal|meridional, or --components both")
-    s = _statistics(context, period, component, edition, TOP, soundings, site)
-    where = f"--soundings {soundings.name} --site '{site}'" if soundings else f"--period {period} --edition {edition}"
+    if matrix is None:
+        s = _statistics(context, period, component, edition, TOP, soundings, site)
+    else:
+        found = _of_matrix(context, matrix, site, period, samples, repair)
+        of = found if isinstance(found, dict) else {"zonal": found.zonal, "meridional": found.meridional}
+        if component not in of:
+            raise UnknownNameError(f"component in {matrix.name}", component, of)
+        s = of[component]
+    where = _where(period, edition, soundings, site, matrix, samples)
     command = (
         f"ascentwind wind apply --component {component} --azimuth {math.degrees(across):.9g} --sign {sign} {where}"
     )
@@ -156,21 +182,22 @@ def apply(
             console.print(line, soft_wrap=True, highlight=False, markup=False)
 
 
-def _apply_both(
-    context: typer.Context,
-    folder: Path,
-    azimuth: float,
-    period: str,
-    edition: str,
-    soundings: Path | None,
-    site: str | None,
-) -> None:
+def _where(
+    period: str, edition: str, soundings: Path | None, site: str | None, matrix: Path | None, samples: float | None
+) -> str:
+    """Return the options that say where a wind is from, for the comment of the files."""
+    if matrix is not None:
+        return f"--matrix {matrix.name} --site '{site}' --period {period} --samples {samples:g}"
+    if soundings is not None:
+        return f"--soundings {soundings.name} --site '{site}'"
+    return f"--period {period} --edition {edition}"
+
+
+def _apply_both(folder: Path, azimuth: float, s: TwoComponentStatistics, where: str) -> None:
     from ..solvers.least_squares import FitOptions
     from ..wind.apply import apply_components
     from ..wind.fitting.progress import fit_progress
 
-    s = _two_components(context, period, edition, soundings, site)
-    where = f"--soundings {soundings.name} --site '{site}'" if soundings else f"--period {period} --edition {edition}"
     command = f"ascentwind wind apply --components both --azimuth {math.degrees(azimuth):.9g} {where}"
     with fit_progress(console, "filters of both components", FitOptions().time_limit) as progress:
         applied = apply_components(folder, s, azimuth, command, FitOptions(progress=progress))
@@ -186,16 +213,33 @@ def _apply_both(
 
 def _two_components(context: typer.Context, period: str, edition: str, soundings: Path | None, site: str | None):
     from ...model.wind.range_reference import shipped_two_components
-    from ...model.wind.soundings import read_soundings
+    from ...model.wind.soundings.read import read_soundings
 
     if soundings is None:
         refuse_unused(context, ["site"], "without --soundings: the shipped tables are of Cape Canaveral")
         return shipped_two_components(period, edition=edition, top=TOP)
     refuse_unused(context, ["period", "edition"], "with --soundings, whose days the statistics are of")
-    read = read_soundings(soundings, drop_incomplete=True)
-    if read.dropped:
-        console.print(f"{read.dropped} incomplete profiles left out", style="dim")
+    read = read_soundings(soundings)
+    _say_incomplete(read)
     return read.statistics(soundings.stem, site)
+
+
+def _say_incomplete(read: MeasuredWinds) -> None:
+    partly = int((~read.complete).sum())
+    if partly:
+        console.print(f"{partly} of {len(read.u)} profiles lack levels and count where they are", style="dim")
+
+
+def _of_matrix(context: typer.Context, file: Path, site: str | None, period: str, samples: float | None, repair: bool):
+    """Return the statistics of a matrix of one's own, by component or of both."""
+    from ...model.wind.matrix_file import read_matrix
+
+    refuse_unused(context, ["edition", "soundings"], "with --matrix, which the statistics are of")
+    if site is None or samples is None or not given(context, "period"):
+        raise DataError(
+            "a matrix does not say of what it is; give --site, --period and --samples, of independent soundings"
+        )
+    return read_matrix(file, site, period, samples, repair)
 
 
 @wind.command()

@@ -439,3 +439,28 @@ def test_building_for_another_azimuth_asks_for_another_wind(falcon):
     file.write_text(file.read_text().replace("azimuth_deg = 90.0", "azimuth_deg = 80.0"))
     with pytest.raises(DataError, match=r"wind.record.azimuth_deg.*is 90, but construction.toml flies towards 80 deg"):
         build_vehicle(falcon)
+
+
+def test_wind_of_a_matrix_carries_its_record(falcon, no_fit, tmp_path):
+    levels = np.arange(0.0, 30001.0, 2000.0)
+    matrix = 36.0 * np.exp(-np.abs(levels[:, None] - levels) / 5000.0)
+    names = ",".join(f"covariance_{k + 1} [m2/s2]" for k in range(levels.size))
+    rows = [f"altitude [m],component,mean [m/s],{names}"]
+    rows += [f"{h:g},meridional,2," + ",".join(f"{x:.9g}" for x in row) for h, row in zip(levels, matrix, strict=True)]
+    file = tmp_path / "mine.csv"
+    file.write_text("\n".join(rows) + "\n")
+    asked = ["wind", "apply", str(falcon), "--component", "meridional", "--matrix", str(file), "--site", "Omelek"]
+    found = CliRunner().invoke(app, [*asked, "--period", "august", "--samples", "55"])
+    assert found.exit_code == 0, found.output
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # a lag between levels 2 km apart is no fit
+        record = load_vehicle(falcon).wind.record
+    assert record is not None
+    assert record.origin == WindOrigin("Omelek", "meridional", "august", "mine.csv")
+    assert record.independent_samples == 55
+    for arguments, says in (
+        (asked, "give --site, --period and --samples"),
+        ([*asked, "--period", "august", "--samples", "55", "--component", "zonal"], "no component in mine.csv 'zonal'"),
+    ):
+        found = CliRunner().invoke(app, arguments)
+        assert says in str(found.exception)

@@ -31,6 +31,10 @@ UNUSED = [
     (["wind", "fit", "--method", "impulse-response", "--noises", "2"], "makes filters of one noise"),
     (["wind", "stats", "--top", "50000"], "50000 m is not among them"),
     (APPLY, "--site is not used without --soundings"),
+    ([*APPLY[:-2], "--samples", "80"], "--samples is not used without --matrix"),
+    ([*APPLY[:-2], "--repair"], "--repair is not used without --matrix"),
+    ([*APPLY, "--matrix", "m.csv", "--edition", "2006"], "--edition is not used with --matrix"),
+    ([*APPLY, "--matrix", "m.csv", *SOUNDINGS], "--soundings is not used with --matrix"),
     ([*APPLY, *SOUNDINGS, "--period", "may"], "--period is not used with --soundings"),
     ([*APPLY, *SOUNDINGS, "--edition", "2006"], "--edition is not used with --soundings"),
     (["wind", "stats", "--normality", "here"], "--normality is not used without --soundings"),
@@ -114,7 +118,10 @@ KNOWN = {
     "design": {"out", "trades", "changes"},
     "reproduce": {"out"},
     "build-vehicle": {"out", "figures", "spacing"},
-    "wind apply": {"component", "components", "azimuth", "sign", "period", "edition", "soundings", "site"},
+    "wind apply": {
+        "component", "components", "azimuth", "sign", "period", "edition", "soundings", "site", "matrix",
+        "samples", "repair",
+    },
     "wind read": {
         "levels", "months", "hours", "years", "latitude", "longitude", "point", "largest_gap", "incomplete", "outliers",
         "out",
