@@ -464,3 +464,23 @@ def test_wind_of_a_matrix_carries_its_record(falcon, no_fit, tmp_path):
     ):
         found = CliRunner().invoke(app, arguments)
         assert says in str(found.exception)
+
+
+def test_soundings_give_both_components(falcon, no_fit, tmp_path):
+    random, file = np.random.default_rng(5), tmp_path / "omelek.csv"
+    rows = ["profile,date,altitude [m],u [m/s],v [m/s]"]
+    for i in range(40):
+        shared = random.standard_normal(2)
+        for h in range(0, 30001, 3000):
+            if i == 7 and h > 20000:
+                continue  # a burst
+            u, v = 6 * (0.6 * shared + 0.8 * random.standard_normal(2))
+            rows.append(f"{i},2003-01-{1 + i % 31:02d},{h},{u:.3f},{v + 2:.3f}")
+    file.write_text("\n".join(rows) + "\n")
+    asked = ["wind", "apply", str(falcon), "--components", "both", "--soundings", str(file), "--site", "Omelek"]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        found = CliRunner().invoke(app, asked)
+    assert found.exit_code == 0, found.output or found.exception
+    assert "1 of 40 profiles lack levels" in found.output
+    assert "[wind.components]" in (falcon / "vehicle.toml").read_text()
