@@ -44,6 +44,7 @@ from .sensitivity.percentile import percentile_sensitivity
 from .sensitivity.second import second_derivatives
 from .solvers.adjoint import AdjointSolver, adjoint_member
 from .solvers.sweep import batch, interpreted_weighting, sweep
+from .station_loads.loads_along_vehicle import resultant_along_vehicle
 from .statistics.cvodes import Cvodes
 from .statistics.dataset import batch_dataset, with_members
 from .statistics.engine import Engine, Progress
@@ -429,6 +430,32 @@ class Study(Case):
         UnknownNameError, TimeRangeError, ParameterValueError, NoVarianceError, IntegrationError
         """
         return resultant_load(self, resultant, window, probabilities, draws, seed)
+
+    def resultant_along_vehicle(
+        self, times: Iterable[float], load: str = "bending_moment", probability: float = LIKE_3_SIGMA
+    ) -> xr.Dataset:
+        """Return the resultant of a load of both planes at every station of the vehicle.
+
+        Parameters
+        ----------
+        times : iterable of float
+            Flight times, s.
+        load : {'bending_moment', 'shear_force'}
+        probability : float
+            Probability with which the resultant exceeds its level at one instant; by default 1 - Phi(3).
+
+        Returns
+        -------
+        xarray.Dataset
+            ``plane_mean``, ``plane_covariance`` by source, ``level`` and ``direction`` over (time, station, ...).
+
+        Raises
+        ------
+        PlanesError
+            The vehicle flies in one plane.
+        NoVehicleError, DataError, TimeRangeError, UnknownNameError, ParameterValueError, IntegrationError
+        """
+        return resultant_along_vehicle(self, times, load=load, probability=probability)
 
     def percentile_sensitivity(
         self, resultant: str, time: float, probability: float = LIKE_3_SIGMA, parameters: Iterable[str] | None = None

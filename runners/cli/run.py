@@ -66,6 +66,7 @@ def run(
     if vehicle is None and system is None:
         raise typer.BadParameter("name a vehicle, or a system of one's own with --system FILE.toml")
     from ...model.equations.stated_twice import compare_stated_twice
+    from ...model.vehicle.planes import BOTH
     from ..case.times import parse_times
     from ..flight_load.files import with_flight_levels
     from ..flight_load.load import DESIGN
@@ -79,6 +80,7 @@ def run(
     from ..statistics.resultants import has_resultants
     from ..views.along_vehicle_files import prepare_along_vehicle, write_along_vehicle
     from ..views.azimuth_sweep import check_turns, checked_azimuths
+    from ..views.resultants_along_vehicle import write_resultants_along
 
     chances = checked_probabilities(probability) if probability else ()
     settings = {"method": method, "relative_tolerance": tolerance}
@@ -149,8 +151,11 @@ def run(
             job.written += _write_azimuths(study, turns, end_times, flown.title, job.folder)
     if along_vehicle is not None:
         with console.status("loads along the vehicle"):
-            files, along = write_along_vehicle(study, end_times, moment_time, job.folder)
-            job.written += files
+            if flown.file.planes == BOTH:
+                job.written += write_resultants_along(study, end_times, moment_time, job.folder)
+            else:
+                files, along = write_along_vehicle(study, end_times, moment_time, job.folder)
+                job.written += files
     _print_peaks(statistics)
     if both is not None:
         _print_resultants(both)

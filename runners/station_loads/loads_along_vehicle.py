@@ -20,11 +20,12 @@ from ...model.equations.loads import axial_force, axial_noise
 from ...model.equations.noise_loads import noise_load
 from ...model.equations.penetration import zone_coefficient
 from ...model.equations.station_loads import KEYS, StationLoads, load_station_loads, station_table
-from ...model.errors import DataError, IntegrationError, UnknownNameError
+from ...model.errors import DataError, IntegrationError, PlanesError, UnknownNameError
 from ...model.system.names import COMBINED
 from ...model.vehicle.columns import local_load_columns
 from ...model.vehicle.loads import AXIAL_FORCE, BENDING_MOMENT, SHEAR_FORCE, SIDES
 from ...model.vehicle.noise_loads import component_deviations, deviating_tables, loading_deviations
+from ...model.vehicle.planes import flown_planes, one_wind
 from ...model.vehicle.vehicle import Vehicle
 from ...model.vehicle.zones import PREFIX as ZONES
 from ..case.case import Case
@@ -33,6 +34,8 @@ from ..solvers.time_nodes import interval_before, time_nodes
 from ..statistics.dataset import QUANTITIES
 from ..statistics.engine import Engine
 from ..statistics.engines import response_statistics
+from ..statistics.norm import LIKE_3_SIGMA, NormOfNormal
+from ..statistics.percentiles import checked_probabilities
 from ..statistics.results import ResponseStatistics
 
 Array = NDArray[np.float64]
@@ -98,6 +101,7 @@ def load_rows(
     DataError, TimeRangeError, DirectNoiseError, UnknownNameError
     """
     vehicle = case.vehicle_for(f"the {_words(load)} along the vehicle")
+    one_wind(vehicle, "a load along the vehicle as rows of the states")
     at = np.array(case.checked_times(times), float)
     along = _along(case, vehicle, load, at, slosh_reaction)
     chosen = np.arange(along.station.size) if stations is None else _chosen(along.station, stations, vehicle, load)
@@ -190,6 +194,7 @@ def every_load_along_vehicle(
     DataError, TimeRangeError, DirectNoiseError, IntegrationError, UnknownNameError
     """
     vehicle = case.vehicle_for(f"the {' and the '.join(map(_words, loads))} along the vehicle")
+    one_wind(vehicle, "a load along the vehicle")
     for load in loads:
         for table in _tables(load):
             station_table(vehicle, table)
@@ -200,6 +205,94 @@ def every_load_along_vehicle(
     if "covariance" not in found:
         raise IntegrationError(f"engine '{found.attrs['engine']}' gives no covariances; use sweep or covariance")
     return [_dataset(case, components, vehicle, load, found, slosh_reaction) for load in loads]
+
+
+def resultant_along_vehicle(
+    case: Case,
+    times: Iterable[float],
+    *,
+    load: str = BENDING_MOMENT,
+    probability: float = LIKE_3_SIGMA,
+    slosh_reaction: bool = True,
+) -> xr.Dataset:
+    """Return the resultant of a load of both planes at every station: means, covariance, level and direction.
+
+    Parameters
+    ----------
+    case : Case
+        Of a vehicle in both planes with tables of the load along the vehicle.
+    times : iterable of float
+        Flight times, s.
+    load : {'bending_moment', 'shear_force'}
+    probability : float
+        With which the resultant exceeds its level at one instant.
+    slosh_reaction : bool
+        As for :func:`loads_along_vehicle`.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``plane_mean`` (time, station, plane), ``plane_covariance`` (time, station, source, plane, other_plane), and
+        from all sources ``level`` and ``direction`` (rad, from pitch towards yaw), both (time, station).
+
+    Raises
+    ------
+    PlanesError
+        The vehicle flies in one plane.
+    DataError, TimeRangeError, DirectNoiseError, IntegrationError, UnknownNameError, ParameterValueError
+    """
+    vehicle = case.vehicle_for(f"the {_words(load)} along the vehicle")
+    planes = flown_planes(vehicle)
+    if len(planes) == 1:
+        raise PlanesError.of_one("a resultant along the vehicle", vehicle.name)
+    if load not in (BENDING_MOMENT, SHEAR_FORCE):
+        raise UnknownNameError("load of two planes", load, (BENDING_MOMENT, SHEAR_FORCE))
+    for plane in planes:
+        station_table(plane.vehicle, load)
+    (probability,) = checked_probabilities(probability)
+    components = _with_components(case, vehicle)
+    names = [[plane.prefix + name for name in _components(plane.vehicle)] for plane in planes]
+    engine = "covariance" if case.executable.shared_library is None else "sweep"
+    found = response_statistics(components, times, responses=[*names[0], *names[1]], engine=engine)
+    at = found["time"].values
+    along = [_along(components, p.vehicle, load, at, slosh_reaction, p.scope) for p in planes]
+    if not np.array_equal(along[0].station, along[1].station):
+        raise DataError(
+            "holds other stations than that of the other plane; build both again",
+            file=vehicle.folder / station_table(planes[0].vehicle, load).file,
+            column="station",
+        )
+    means = found.mean.sel(source=COMBINED)
+    mean = np.stack(
+        [np.einsum("tnc,tc->tn", a.rows, means.sel(response=n).values) for a, n in zip(along, names, strict=True)],
+        axis=2,
+    )
+    whole = found["covariance"]
+    covariance = np.zeros((*mean.shape[:2], whole.sizes["source"], 2, 2))
+    for i, j in ((0, 0), (0, 1), (1, 1)):
+        P = whole.sel(response=names[i], other_response=names[j]).transpose("time", "source", ...).values
+        part = np.einsum("tnc,tscd,tnd->tns", along[i].rows, P, along[j].rows, optimize=True)
+        covariance[..., i, j] = covariance[..., j, i] = part
+    law = NormOfNormal(mean, covariance[:, :, list(whole["source"].values).index(COMBINED)])
+    level = law.percentile(probability)
+    over = ("time", "station")
+    units = {"units": LOADS[load]}
+    return xr.Dataset(
+        {
+            "plane_mean": ((*over, "plane"), mean, units),
+            "plane_covariance": ((*over, "source", "plane", "other_plane"), covariance),
+            "level": (over, level, units | {"long_name": f"level that the resultant exceeds with {probability:g}"}),
+            "direction": (over, law.direction(level).most_likely, {"units": "rad"}),
+        },
+        {
+            "time": ("time", at, {"units": "s", "long_name": "flight time"}),
+            "station": ("station", along[0].station, {"units": "m", "long_name": "vehicle station"}),
+            "source": whole["source"].values,
+            "plane": [plane.name for plane in planes],
+            "other_plane": [plane.name for plane in planes],
+        },
+        provenance(case) | {"load": load, "probability": probability, "slosh_reaction": str(slosh_reaction).lower()},
+    )
 
 
 def _dataset(
@@ -255,9 +348,10 @@ class _Along:
     constant: Array
 
 
-def _along(case: Case, vehicle: Vehicle, load: str, times: Array, slosh_reaction: bool) -> _Along:
+def _along(case: Case, vehicle: Vehicle, load: str, times: Array, slosh_reaction: bool, scope: str = "") -> _Along:
+    """Return K and c; of one of two planes with the tables that begin with its ``scope`` in the place of the common."""
     times = np.array([interval_before(case.executable, node).high for node in time_nodes(case.executable, times)])
-    at = [case.tables(float(time)) for time in times]
+    at = [_scoped(case.tables(float(time)), scope) for time in times]
     flight = {name: np.array([tables[name] for tables in at])[:, None] for name in at[0]}
     parts = [load_station_loads(vehicle, table) for table in _tables(load)]
     first = parts[0]
@@ -281,6 +375,11 @@ def _along(case: Case, vehicle: Vehicle, load: str, times: Array, slosh_reaction
             across *= SIDES[load] * np.divide(2.0, radius, out=zero.copy(), where=radius > 0)[:, :, None]
         rows = rows + across
     return _Along(first.station, first.forward_of_gimbal, rows, constant)
+
+
+def _scoped(tables: dict[str, float], scope: str) -> dict[str, float]:
+    own = {name.removeprefix(scope): value for name, value in tables.items() if scope and name.startswith(scope)}
+    return tables | own
 
 
 def _axial_rows(

@@ -1,0 +1,75 @@
+"""Derivatives of a percentile of a resultant against differences of the percentile itself, and bad input."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import ascentwind as aw
+from ascentwind.model.errors import ParameterValueError, PlanesError, TimeRangeError, UnknownNameError
+from ascentwind.runners.station_loads.loads_along_vehicle import resultant_along_vehicle
+from tests.support.lag import lag
+
+MOMENTS = ("pitch_bending_moment", "yaw_bending_moment")
+NAMES = ("wind.azimuth", "control.T1.gain", "thrust.sigma", "wind.mean_scale", "wind.sigma_scale", "bending.1.damping")
+
+
+@pytest.fixture(scope="module")
+def both():
+    return aw.Study.load("as504", changes={"planes": "both"})
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("p", [0.00135, 0.2])
+def test_differences_of_the_percentile(both, p):
+    found = both.percentile_sensitivity("resultant_bending_moment", 75.0, p, parameters=NAMES)
+
+    def level(changes: dict[str, float]) -> float:
+        engine = aw.Sweep(relative_tolerance=1e-11)
+        statistics = both.with_parameters(changes).response_statistics([75.0], engine=engine)
+        return float(statistics.norm(*MOMENTS).percentile(p)[0])
+
+    assert found.attrs["value"] == pytest.approx(level({}), rel=1e-8)
+    for name in NAMES:
+        at = both.parameters[name].value
+        step = 2e-3 * abs(at)
+        a, b, c, d = (level({name: at + k * step}) for k in (-2, -1, 1, 2))
+        expected = (8 * (c - b) - (d - a)) / (12 * step)
+        assert float(found["derivative"].sel(parameter=name)) == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.slow
+def test_the_wind_as_a_whole_and_its_tables_agree(both):
+    """A percent of sigma is a percent of every row of both components' H: the factor and the tables are two roads."""
+    found = both.percentile_sensitivity("resultant_bending_moment", 75.0, parameters=["wind.sigma_scale"])
+    rows = [name for name in found["table"].values if str(name).startswith("wind_filter.H_")]
+    by_tables = float(found["table_elasticity"].sel(table=rows).sum())
+    assert by_tables == pytest.approx(float(found["elasticity"][0]), rel=1e-6)
+
+
+@pytest.mark.slow
+def test_resultant_along_the_vehicle_at_a_load_station_is_that_of_the_output(both):
+    found = resultant_along_vehicle(both, [60.0, 75.0], slosh_reaction=False)
+    k = int(np.argmin(np.abs(found["station"].values - 25.0)))
+    law = both.response_statistics([60.0, 75.0]).norm(*MOMENTS)
+    np.testing.assert_allclose(found["level"].values[:, k], law.percentile(), rtol=1e-6)
+    combined = found["plane_covariance"].sel(source="combined").values[:, k]
+    np.testing.assert_allclose(combined, law.covariance, rtol=1e-5)
+
+
+def test_refused():
+    study = lag()
+    with pytest.raises(PlanesError, match="both planes"):
+        study.percentile_sensitivity("resultant_bending_moment", 1.0)
+
+
+@pytest.mark.slow
+def test_refused_of_both(both):
+    with pytest.raises(UnknownNameError, match="did you mean 'resultant_bending_moment'"):
+        both.percentile_sensitivity("resultant_bending_momen", 75.0)
+    with pytest.raises(ParameterValueError, match="probability"):
+        both.percentile_sensitivity("resultant_bending_moment", 75.0, 1.5)
+    with pytest.raises(TimeRangeError):
+        both.percentile_sensitivity("resultant_bending_moment", 500.0)
+    with pytest.raises(PlanesError, match="a design wind"):
+        both.design_wind("yaw_bending_moment", 75.0)
