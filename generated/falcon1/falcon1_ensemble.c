@@ -18,7 +18,7 @@
 #endif
 
 enum { STOPPED = -1 }; /* what a stopped call returns */
-enum { STATES = 24, SOURCES = 3, OUTPUTS = 13, LANES = 32 };
+enum { STATES = 35, SOURCES = 4, OUTPUTS = 13, LANES = 32 };
 
 static void philox(const uint32_t key[2], const uint32_t counter[4], uint32_t out[4]) {
   uint32_t k0 = key[0], k1 = key[1], c0 = counter[0], c1 = counter[1], c2 = counter[2], c3 = counter[3];

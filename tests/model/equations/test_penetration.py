@@ -229,3 +229,12 @@ def test_strips_that_are_none_of_the_vehicles_are_refused(vehicle_folder, change
 def test_exact_delays_need_zones(as504):
     with pytest.raises(aw.errors.DataError, match="no gust zones"):
         check_gust_penetration(as504, TIME)
+
+
+@pytest.mark.slow
+def test_derivatives_follow_the_wind_that_the_foremost_zone_meets(cache):
+    """By rows of the largest elasticities, the altitude's among them, which moves the foremost zone as well."""
+    study = aw.Study.load("as504", changes=ZONES | GUSTY)
+    found = study.check_sensitivity("bending_moment", TIME, parameters=["turbulence.length"], rows=6)
+    assert found["agrees"].values.all()
+    assert any(item.startswith("altitude at") for item in found["item"].values)
