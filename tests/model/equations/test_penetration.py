@@ -205,25 +205,34 @@ def test_a_missing_table_is_asked_for_or_told(edit):
         assert aw.load_vehicle(folder, changes=GUSTY).zones is None
 
 
-@pytest.mark.parametrize(
-    ("change", "says"),
-    [
-        (lambda row: [*row[:3], str(2.2 * float(row[3])), *row[4:]], "adds up to"),
-        (lambda row: [*row[:4], str(-float(row[4])), *row[5:]], "adds up to"),
-        (lambda row: [*row[:2], str(1000 * float(row[2])), *row[3:]], "lies beyond the vehicle"),
-        (lambda row: row if row[0] != "75" or float(row[2]) > 1 else None, "every strip once at every time"),
-    ],
-    ids=["slopes of another area", "moments from the nose", "millimetres", "a row is missing"],
-)
-def test_strips_that_are_none_of_the_vehicles_are_refused(vehicle_folder, change, says):
-    lines = strips(vehicle_folder).read_text().splitlines()
+def changed_strips(folder, change) -> None:
+    lines = strips(folder).read_text().splitlines()
     head = next(k for k, line in enumerate(lines) if line.startswith("time"))
     rows = [change(line.split(",")) for line in lines[head + 1 :]]
     text = "\n".join([*lines[: head + 1], *(",".join(row) for row in rows if row is not None)])
-    strips(vehicle_folder).write_text(text + "\n")
+    strips(folder).write_text(text + "\n")
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (lambda row: [*row[:2], str(1000 * float(row[2])), *row[3:]], "lies beyond the vehicle"),
+        (lambda row: row if row[0] != "75" or float(row[2]) > 1 else None, "every strip once at every time"),
+    ],
+    ids=["millimetres", "a row is missing"],
+)
+def test_strips_that_lie_elsewhere_are_refused(vehicle_folder, change, says):
+    changed_strips(vehicle_folder, change)
     with pytest.raises(aw.errors.DataError, match=says):
         aw.load_vehicle(vehicle_folder, changes=ZONES)
     aw.load_vehicle(vehicle_folder)  # what is not used is not read
+
+
+@pytest.mark.parametrize(("column", "factor"), [(3, 2.2), (3, 1.01), (4, -1.0), (5, 1.1)])
+def test_strips_that_do_not_add_up_are_told(vehicle_folder, column, factor):
+    changed_strips(vehicle_folder, lambda row: [*row[:column], str(factor * float(row[column])), *row[column + 1 :]])
+    with pytest.warns(aw.errors.PlausibilityWarning, match="adds up to .* along the vehicle, but"):
+        aw.load_vehicle(vehicle_folder, changes=ZONES)
 
 
 def test_exact_delays_need_zones(as504):

@@ -14,7 +14,7 @@ from ascentwind.model.construction.earth import EQUATORIAL_RADIUS, GRAVITATIONAL
 from ascentwind.model.construction.tank_shape import TankShape
 from ascentwind.model.vehicle.reader import load_vehicle
 from ascentwind.model.vehicle.shipped import built_in_vehicles
-from ascentwind.runners import Study
+from ascentwind.runners import Cvodes, Study
 from ascentwind.runners.case.times import parse_times, spread_over, time_of_greatest_dynamic_pressure
 from ascentwind.runners.cli.new_vehicle import copy_vehicle
 from ascentwind.runners.construct.ascent.mean_flight import MeanFlight, fly
@@ -60,10 +60,13 @@ def forward(falcon1):
     return covariance_equation(falcon1.with_means, TIMES, 1e-8)
 
 
-@pytest.mark.parametrize("engine", ["sweep", "cvodes"])
+@pytest.mark.parametrize("engine", ["sweep", Cvodes(relative_tolerance=1e-7)], ids=["sweep", "cvodes"])
 @pytest.mark.slow
 def test_engines_meet_the_covariance_equation(falcon1, forward, engine):
-    """Moments of 10 to 100 kN m to the accuracy that AS-504's have at 10 MN m: each source, and the mean."""
+    """Moments of 10 to 100 kN m to the accuracy that AS-504's have at 10 MN m: each source, and the mean.
+
+    At its default tolerance CVODES misses by 1.1e-5 what a source has that makes half a per cent of a shear force.
+    """
     found = falcon1.response_statistics(TIMES, engine=engine)
     np.testing.assert_allclose(found.variance.values[:, :, :-1], forward.variance, rtol=1e-5)
     size = np.maximum(np.abs(forward.mean), np.sqrt(forward.variance.sum(axis=2)))
