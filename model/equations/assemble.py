@@ -113,8 +113,10 @@ def _winds(vehicle: Vehicle, numbers: Sequence[Numbers]) -> dict[str, WindBlock]
     if vehicle.turbulence and one.turbulence:
         driver = found[WIND].white[0]
         parts = [turbulence_block(vehicle.turbulence, one.turbulence, one.tables, rate, driver) for _ in numbers]
-        columns = ([getattr(part, name) for part in parts] for name in ("states", "derivative", "white"))
-        found[TURBULENCE] = WindBlock(*(ca.vertcat(*c) for c in columns), tuple(part.winds[0] for part in parts))
+        states, derivative, white = (
+            ca.vertcat(*(getattr(part, name) for part in parts)) for name in ("states", "derivative", "white")
+        )
+        found[TURBULENCE] = WindBlock(states, derivative, white, tuple(part.winds[0] for part in parts))
     return found
 
 

@@ -55,19 +55,19 @@ def parts_from_arrays(
     grid = time_grid("times", times, discontinuities)
     arrays, counts = _checked(name, grid, matrices, u)
     named = _names(name, counts, mapping("names", names, left_out=True), matrices)
-    sources, units = mapping("sources", sources, left_out=True), mapping("units", units, left_out=True)
-    scales = mapping("scales", scales, left_out=True)
+    sources, given_units = mapping("sources", sources, left_out=True), mapping("units", units, left_out=True)
+    given_scales = mapping("scales", scales, left_out=True)
     check_keys("noise", sources, named["noises"])
-    check_keys("state, output or input", units, (*named["states"], *named["outputs"], *named["inputs"]))
-    check_keys("state or output", scales, (*named["states"], *named["outputs"]))
+    check_keys("state, output or input", given_units, (*named["states"], *named["outputs"], *named["inputs"]))
+    check_keys("state or output", given_scales, (*named["states"], *named["outputs"]))
     entries = _Entries(grid, interpolation)
     symbols = {kind: ca.SX.sym(kind, count) for kind, count in counts.items()}
     written = {
-        matrix: entries.matrix(matrix, array, lambda i, j, m=matrix: _unit(m, named, units, i, j))
+        matrix: entries.matrix(matrix, array, lambda i, j, m=matrix: _unit(m, named, given_units, i, j))
         for matrix, array in arrays.items()
         if matrix != "u"
     }
-    inputs = entries.matrix("u", arrays["u"][:, :, None], lambda i, _: units.get(named["inputs"][i], "1"))
+    inputs = entries.matrix("u", arrays["u"][:, :, None], lambda i, _: given_units.get(named["inputs"][i], "1"))
     x, w, given = symbols["states"], symbols["noises"], symbols["inputs"]
     start, end = float(grid.rows[0]), float(grid.rows[-1])
     bends = {t for table in entries.tables for t in kinks(table, grid.jumps)}
@@ -81,9 +81,9 @@ def parts_from_arrays(
         "v": ca.vertcat(ca.SX(0, 1), *entries.v),
         "derivative": written["A"] @ x + written["B"] @ w + written["E"] @ given,
         "output": written["C"] @ x + written["D"] @ w + written["G"] @ given,
-        "states": tuple(State(n, units.get(n, "1"), scales.get(n, 1.0)) for n in named["states"]),
+        "states": tuple(State(n, given_units.get(n, "1"), given_scales.get(n, 1.0)) for n in named["states"]),
         "noises": tuple(Noise(n, sources.get(n, n)) for n in named["noises"]),
-        "outputs": tuple(Output(n, units.get(n, "1"), scales.get(n, 1.0)) for n in named["outputs"]),
+        "outputs": tuple(Output(n, given_units.get(n, "1"), given_scales.get(n, 1.0)) for n in named["outputs"]),
         "parameters": tuple(entries.parameters),
         "input_names": tuple(named["inputs"]),
         "input_values": ca.densify(inputs),
@@ -181,7 +181,7 @@ def _names(
 def _labels(kind: str, matrices: Mapping[str, Any]) -> list[str] | None:
     """Return the labels of an xarray's own coordinates, where it has texts."""
     for matrix, kinds in SHAPES.items():
-        array = matrices.get(matrix)
+        array: Any = matrices.get(matrix)
         if kind not in kinds or not (hasattr(array, "dims") and hasattr(array, "coords")) or len(array.dims) < 2:
             continue
         dimension = array.dims[-2 + kinds.index(kind)]

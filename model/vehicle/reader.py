@@ -121,7 +121,7 @@ def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehi
     reader.add("trajectory", file.tables.trajectory, TRAJECTORY, "", turns, turns if len(names) > 1 else ())
     reader.add("propulsion", file.tables.propulsion, PROPULSION)
     if len(names) == 1:
-        _add_tables(reader, plane_file(file, names[0]))
+        _add_tables(reader, plane_file(file, next(iter(names))))
         _add_moment_of_inertia(reader, file, names[0], "")
     else:
         _add_tables(reader, file)
@@ -132,7 +132,7 @@ def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehi
         wind = _load_both(file.wind, reader) if file.planes == BOTH else _load_wind(file, reader)
         turbulence = _load_turbulence(file.wind.turbulence, wind, reader)
     reader.collector.raise_all()
-    zones = _load_zones(reader, file if len(names) > 1 else plane_file(file, names[0]))
+    zones = _load_zones(reader, file if len(names) > 1 else plane_file(file, next(iter(names))))
     for name, noise in file.noise.items():
         for table in noise.tables:
             if table not in reader.tables:

@@ -149,7 +149,7 @@ def months(
         refuse_unused(context, ["edition"], "with --soundings")
         if site is None:
             raise DataError("soundings do not say where they were taken; give --site")
-    wanted = list(MONTHS)
+    wanted: list[str] = list(MONTHS)
     if chosen != "all":
         wanted = [m if isinstance(m, str) else MONTHS[m - 1] if 1 <= m <= 12 else str(m) for m in parse_months(chosen)]
     for month in wanted:

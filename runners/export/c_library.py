@@ -140,7 +140,7 @@ def _measured_wind(case: Case, statistics: ResponseStatistics | None) -> Measure
     altitudes = [case.tables(t)[met] for t in times]
     higher = [k for k, h in enumerate(altitudes) if not k or h > max(altitudes[:k])]
     combined = statistics.std.sel(source=COMBINED)
-    peaks = (np.abs(statistics.mean.sel(source=COMBINED)) + 3 * combined).max("time")
+    peaks = (abs(statistics.mean.sel(source=COMBINED)) + 3 * combined).max("time")
     limits = {str(name): float(f"{LIMIT * peaks.sel(response=name).item():.3g}") for name in peaks["response"].values}
     return MeasuredInput(
         WIND, met, np.array(altitudes)[higher], np.array(winds)[higher], "m/s",

@@ -93,7 +93,7 @@ class PairProcess:
         unit = np.where(std > 0, std, 1.0)
         correlation = R / np.outer(unit, unit) + JITTER * np.eye(size)
         try:
-            return std[:, None] * np.linalg.cholesky(correlation)
+            return np.asarray(std[:, None] * np.linalg.cholesky(correlation), float)
         except np.linalg.LinAlgError:
             values, vectors = np.linalg.eigh(correlation)
             return std[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))

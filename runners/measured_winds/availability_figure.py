@@ -29,12 +29,12 @@ def availability_figure(found: xr.Dataset, title: str) -> Figure:
     """
     p = np.maximum(found["probability"].values, LEAST)
     months, angles = [str(m) for m in found["month"].values], np.degrees(found["azimuth"].values)
-    with rc_context(STYLE | {"axes.grid": False}):
+    with rc_context({**STYLE, "axes.grid": False}):
         figure = Figure(figsize=(2.5 + 0.75 * max(angles.size, 4), 1.8 + 0.42 * len(months)), layout="constrained")
         axes = figure.subplots()
         image = axes.imshow(p, aspect="auto", cmap="YlOrRd", norm=LogNorm(min(p.min(), 1e-4), max(p.max(), 1e-2)))
         for i, j in np.ndindex(*p.shape):
-            shade = image.norm(p[i, j])
+            shade = float(np.asarray(image.norm(p[i, j])))
             axes.text(j, i, f"{found['probability'].values[i, j]:.1g}", ha="center", va="center", fontsize=8,
                       color="white" if shade > 0.65 else "black")  # fmt: skip
         axes.set_xticks(range(angles.size), [f"{a:.4g}" for a in angles])

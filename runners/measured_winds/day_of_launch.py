@@ -17,6 +17,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 import xarray as xr
@@ -452,8 +453,7 @@ def day_of_launch(
         case.checked_responses(table.values)
         for name in table.values:
             table.of(name, case.system.outputs[case.system.output_index(name)].unit, np.array(flown))
-    many = isinstance(soundings, Sequence) and not isinstance(soundings, str)
-    balloons = list(soundings) if many else [soundings]
+    balloons: list[Balloon] = list(soundings) if isinstance(soundings, list | tuple) else [cast("Balloon", soundings)]
     hours = list(hours_before) if isinstance(hours_before, Sequence) else [hours_before]
     if len(balloons) != len(hours):
         raise ParameterValueError(f"{len(balloons)} soundings and {len(hours)} times before launch; give one each")

@@ -149,7 +149,8 @@ def launch_figure(launch: DayOfLaunch, title: str) -> Figure:
             panel.set(ylabel=f"{words(name)} ({unit})", xlim=(launch.times[0], launch.times[-1]))
             if not k:
                 panel.legend(fontsize=8, ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.0))
-        panel.set_xlabel("flight time (s)")
+            if k == len(shown) - 1:
+                panel.set_xlabel("flight time (s)")
         told = ""
         if launch.limits is not None:
             told = f"\n{'GO' if launch.go else 'NO-GO'}: {launch.probability:.2g} of flights pass a limit"

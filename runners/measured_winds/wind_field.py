@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import dct
-from scipy.optimize import brentq, least_squares
+from scipy.optimize import least_squares, root_scalar
 
 from ...model.errors import ParameterValueError
 from ...model.vehicle.planes import one_wind
@@ -161,7 +161,7 @@ def fitted_persistence(
         raise ParameterValueError(
             f"a correlation of {wanted:.6g} after {hours:g} h is more than any persistence has; give another"
         )
-    return of(float(brentq(off, low, high, xtol=1e-10)))
+    return of(float(root_scalar(off, bracket=(low, high), method="brentq", xtol=1e-10).root))
 
 
 def measured_persistence(field: WindField, soundings: Soundings, component: str) -> Persistence:

@@ -15,7 +15,7 @@ from scipy.optimize import brentq, least_squares
 from ...model.system.names import COMBINED
 from ...model.vehicle.shipped import find_vehicle
 from ...model.wind.range_reference import shipped_statistics
-from ...model.wind.statistics import WindStatistics
+from ...model.wind.statistics import WindModel, WindStatistics
 from ..statistics.larger_side import LARGER_SIDE, sign
 from ..study import Study
 from ..views.wind_comparison import stretched
@@ -152,6 +152,7 @@ class Model:
         vehicle = study.vehicle_for("a calibration")
         if values["wind_correlation"] != 1:
             wind = vehicle.wind
+            assert isinstance(wind, WindModel)  # the report has one plane
             faster = stretched(wind.shaping_filter, values["wind_correlation"])
             study = study.with_wind(replace(wind, shaping_filter=faster))
         numbers = {"bending_damping": "bending.", "slosh_damping": "slosh."}

@@ -137,7 +137,7 @@ def _one(
         levels.append([norm.percentile(p) for p in probabilities])
         directions.append([norm.direction(level) for level in levels[-1]])
     by_direction = {
-        name: np.moveaxis([[getattr(d, part) for d in row] for row in directions], -1, 0)
+        name: np.moveaxis(np.array([[getattr(d, part) for d in row] for row in directions]), -1, 0)
         for name, part in (
             ("direction", "most_likely"),
             ("circular_mean", "circular_mean"),
@@ -316,7 +316,7 @@ class Resultants:
                 for s, source in enumerate(d["source"].values):
                     for p, chance in enumerate(d["probability"].values):
                         at: dict[str, Any] = {"time": k, "resultant": r, "source": s, "probability": p}
-                        values = [float(d[n].values[tuple(at[dim] for dim in d[n].dims)]) for n in names]
+                        values = [float(d[n].values[tuple(at[str(dim)] for dim in d[n].dims)]) for n in names]
                         numbers = [np.format_float_scientific(x, 9) for x in (*d["plane_mean"].values[k, r], *values)]
                         writer.writerow(
                             [f"{time:.12g}", resultant, d["unit"].values[r], source, f"{float(chance)!r}", *numbers]

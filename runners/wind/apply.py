@@ -376,11 +376,12 @@ def _with_section(text: str, section: str, name: tuple[str, ...], file: Path) ->
 
 def _replaced(before: dict[str, Any], section: dict[str, Any], name: tuple[str, ...]) -> dict[str, Any]:
     """Return what a file should hold once a section has taken its place."""
-    if len(name) > 1:
-        return before | {name[0]: _replaced(before[name[0]], section[name[0]], name[1:])}
-    wind = before.get(name[0])
+    first, rest = name[0], name[1:]
+    if rest:
+        return before | {first: _replaced(before[first], section[first], rest)}
+    wind = before.get(first)
     kept = {k: wind[k] for k in KEPT if name == ("wind",) and isinstance(wind, dict) and k in wind}
-    return before | {name[0]: section[name[0]] | kept}
+    return before | {first: section[first] | kept}
 
 
 def _last_comments(lines: list[str]) -> list[str]:

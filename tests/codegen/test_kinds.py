@@ -73,7 +73,8 @@ def chains(groups: int, each: int, shared: bool, seed: int) -> Study:
             time=ca.SX.sym("t"),
             states=states,
             noises={**noises, "m": m},
-            outputs={f"y_{g}": sum(x[g]) for g in range(groups)} | {"sum": sum(sum(part) for part in x)},
+            outputs={f"y_{g}": ca.sum1(ca.vertcat(*x[g])) for g in range(groups)}
+            | {"sum": ca.sum1(ca.vertcat(*(state for part in x for state in part)))},
             inputs={"u": (u, ca.SX(0.3))},
             start_covariance={"m": np.diag([0.5, *[0.0] * (groups * each)])},
             end=6.0,

@@ -24,7 +24,7 @@ GUST, GUST_LENGTH = 2.0, 500.0  # m/s, m
 def launcher() -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Return times (k,), A (k, 13, 13), B (k, 13, 2) and C (3, 13)."""
     table = pd.read_csv(TABLE, comment="#")
-    table = table[(table["time"] >= FIRST) & (table["time"] <= LAST)]
+    table = table.loc[(table["time"] >= FIRST) & (table["time"] <= LAST)]
     at = {name: i for i, name in enumerate(STATES)}
     found = [(_state_matrix(row, at), _noise_matrix(row, at)) for row in table.to_dict("records")]
     A, B = (np.array(matrices) for matrices in zip(*found, strict=True))

@@ -10,7 +10,7 @@ import pytest
 from ascentwind.codegen.system.evaluation import MatrixEvaluator
 from ascentwind.model.tables import table_values
 from ascentwind.model.vehicle.planes import flown_planes
-from ascentwind.model.wind.two_components import plane_weights
+from ascentwind.model.wind.two_components import TwoComponentWind, plane_weights
 from ascentwind.runners import Study
 from tests.support.planes import EACH, HORIZONTAL, in_both, in_one
 
@@ -106,6 +106,7 @@ def test_pitch_alone_takes_the_part_across_the_path():
 def test_a_tail_wind_pitches_over_and_turns_to_a_positive_angle(both):
     """With azimuth 90 a wind towards the east is a tail wind: positive angle of attack in pitch, nothing in yaw."""
     vehicle = in_both()
+    assert isinstance(vehicle.wind, TwoComponentWind)
     east = replace(vehicle.wind.zonal.mean, values=np.full_like(vehicle.wind.zonal.mean.values, 10.0))
     still = replace(vehicle.wind.meridional.mean, values=np.zeros_like(east.values))
     wind = replace(

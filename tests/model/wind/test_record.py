@@ -22,7 +22,7 @@ from ascentwind.model.wind.range_reference import range_reference, shipped_stati
 from ascentwind.model.wind.record import WindOrigin, WindRecord
 from ascentwind.model.wind.shaping_filter import ShapingFilter
 from ascentwind.model.wind.soundings.read import read_soundings
-from ascentwind.model.wind.statistics import REPORT_SAMPLES
+from ascentwind.model.wind.statistics import REPORT_SAMPLES, WindModel
 from ascentwind.runners.cli.app import app
 from ascentwind.runners.construct.build_vehicle import build_vehicle
 from ascentwind.runners.wind import apply as wind_apply
@@ -65,6 +65,7 @@ def remove_record(folder: Path) -> None:
 def test_shipped_vehicles_hold_one_wind_and_load_without_a_word(name):
     vehicle = quiet(built_in_vehicles()[name])
     wind = vehicle.wind
+    assert isinstance(wind, WindModel)
     assert wind.record is not None
     assert wind.record.origin == wind.shaping_filter.origin
     assert wind.record.independent_samples == REPORT_SAMPLES
@@ -309,6 +310,7 @@ def test_the_command_writes_filter_mean_deviation_and_record_of_one_wind(falcon)
     table = range_reference("february", "2006")
     kilometres = (table.altitude % 1000 == 0) & (table.altitude <= 30000)
     h = table.altitude[kilometres]
+    assert isinstance(vehicle.wind, WindModel)
     assert vehicle.wind.mean.polynomial(h) == pytest.approx(table.mean["meridional"][kilometres], abs=6e-4)
     wanted = table.standard_deviation["meridional"][kilometres]
     assert standard_deviation(vehicle.wind.shaping_filter, h) == pytest.approx(wanted, rel=1e-3)
@@ -326,8 +328,10 @@ def test_applied_again_nothing_is_added_and_another_wind_overwrites_no_file(falc
     assert second.unused == tuple(p.name for p in first.files[:1])
     for name in kept.keys() - {"vehicle.toml"}:
         assert (falcon / name).read_bytes() == kept[name]
-    one, other = load_vehicle(built_in_vehicles()["falcon1"]).wind.mean, quiet(falcon).wind.mean
-    assert other.values == pytest.approx(-one.values, abs=1e-9)
+    one, other = load_vehicle(built_in_vehicles()["falcon1"]).wind, quiet(falcon).wind
+    assert isinstance(one, WindModel)
+    assert isinstance(other, WindModel)
+    assert other.mean.values == pytest.approx(-one.mean.values, abs=1e-9)
 
 
 def test_comments_and_sections_around_the_wind_stay(falcon, no_fit):

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import shutil
+from pathlib import Path
+
 import numpy as np
 import pytest
 import sounding_files as files
 import xarray as xr
 
+import ascentwind as aw
+from ascentwind.model.errors import OutputFolderError
+from ascentwind.model.vehicle.shipped import built_in_vehicles
 from ascentwind.runners.cli.app import main
 
 LEVELS = np.array([0.0, 1000.0, 3000.0, 5000.0, 7000.0, 9000.0, 11000.0, 13000.0])
@@ -69,3 +75,21 @@ def test_normality_of_soundings(winds, tmp_path, monkeypatch, capsys):
     assert run(monkeypatch, "wind", "stats", "--soundings", winds, "--component", "zonal", "--normality", out) == 0
     assert "skewness" in capsys.readouterr().out
     assert {p.name for p in out.iterdir()} == {"normality.png", "normality.svg"}
+
+
+def test_both_components_of_soundings_are_applied(winds, tmp_path, monkeypatch):
+    """The fits are left out: what they would be of."""
+    seen = []
+
+    def stand_in(folder, statistics, *_):
+        seen.append(statistics)
+        raise OutputFolderError("seen")
+
+    monkeypatch.setattr("ascentwind.runners.wind.apply.apply_components", stand_in)
+    shutil.copytree(built_in_vehicles()["falcon1"], tmp_path / "mine")
+    asked = ["--components", "both", "--azimuth", "90", "--soundings", winds, "--site", "Here"]
+    assert run(monkeypatch, "wind", "apply", tmp_path / "mine", *asked) == 2
+    (both,) = seen
+    expected = aw.read_soundings(winds).statistics(Path(winds).stem, "Here")
+    np.testing.assert_array_equal(both.zonal.standard_deviation, expected.zonal.standard_deviation)
+    np.testing.assert_array_equal(both.meridional.mean, expected.meridional.mean)

@@ -12,7 +12,7 @@ from scipy.stats import ncx2
 import ascentwind as aw
 from ascentwind.model import define_system
 from ascentwind.model.errors import ParameterValueError, PlanesError, UnknownNameError
-from ascentwind.model.wind.two_components import TwoComponentFilter
+from ascentwind.model.wind.two_components import TwoComponentFilter, TwoComponentWind
 from ascentwind.runners.statistics.norm import LIKE_3_SIGMA, NormOfNormal
 from ascentwind.runners.statistics.resultant_figures import direction_figure, history_figure
 from tests.support.lag import lag
@@ -161,6 +161,7 @@ def test_azimuth_zero_and_a_deviation_each_are_the_single_planes(plane, componen
 def test_the_same_filter_in_both_components_makes_planes_equal_and_independent(horizontal):
     vehicle = in_both(HORIZONTAL)
     wind = vehicle.wind
+    assert isinstance(wind, TwoComponentWind)
     f = wind.filters
     same = TwoComponentFilter(
         f.zonal, replace(f.zonal, origin=None), replace(f.noise_correlation, values=0 * f.noise_correlation.values), 0.0
@@ -180,8 +181,10 @@ def test_the_same_filter_in_both_components_makes_planes_equal_and_independent(h
 def test_mirrored_wind_and_azimuth_have_the_same_resultant(horizontal):
     """v -> -v and Az -> 180 deg - Az is a mirror in the east-west line."""
     study = aw.Study.load("as504", changes={"planes": "both"})
-    vehicle = study.vehicle
-    wind, f = vehicle.wind, vehicle.wind.filters
+    vehicle = study.vehicle_for("a mirror")
+    wind = vehicle.wind
+    assert isinstance(wind, TwoComponentWind)
+    f = wind.filters
     south = replace(wind.meridional, mean=replace(wind.meridional.mean, values=-wind.meridional.mean.values))
     r = replace(f.noise_correlation, values=-f.noise_correlation.values)
     mirrored = replace(

@@ -9,6 +9,7 @@ from lag import GAIN, closed_form, dispersion, lag, normal
 from ascentwind.codegen.ensemble.compiled import EnsembleNeedsCompilerError
 from ascentwind.codegen.toolchain.compiler import Compiler
 from ascentwind.codegen.toolchain.library import NoCompilerError
+from ascentwind.model.wind.statistics import WindModel
 from ascentwind.runners import Study
 from ascentwind.runners.parameter_study import run_parameter_study
 from ascentwind.runners.statistics.cvodes import Cvodes
@@ -113,4 +114,5 @@ def test_a_vehicle_compiles_nowhere(monkeypatch, tmp_path):
     assert study.response_statistics([12.0]).attrs["engine"] == "cvodes"
     assert study.batch([{"thrust.sigma": 0.02}], [12.0]).attrs["engine"] == "cvodes"
     assert study.vehicle is not None
+    assert isinstance(study.vehicle.wind, WindModel)
     assert study.with_wind(study.vehicle.wind).response_statistics([11.0]).attrs["engine"] == "cvodes"
