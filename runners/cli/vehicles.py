@@ -70,9 +70,15 @@ def build_vehicle(
             job.written += write_figure(draw(numbers), job.folder, name)
             bar.done()
     flight = numbers.flight
-    table = Table("event", "time (s)", title=f"Mean flight of {numbers.construction.name}")
+    table = Table("event", title=f"Mean flight of {numbers.construction.name}")
+    for column in ("time (s)", "Mach", "speed (m/s)", "altitude (km)", "q (kPa)", "mass (t)"):
+        table.add_column(column, justify="right", no_wrap=True)
     for event, time in sorted(flight.events.items(), key=lambda item: item[1]):
-        table.add_row(event.replace("_", " "), f"{time:.2f}")
+        at = flight.at_events[event]
+        table.add_row(
+            event.replace("_", " "), f"{time:.2f}", f"{at['mach']:.3f}", f"{at['relative_velocity']:.1f}",
+            f"{at['altitude'] / 1e3:.2f}", f"{at['dynamic_pressure'] / 1e3:.2f}", f"{at['mass'] / 1e3:.1f}",
+        )  # fmt: skip
     console.print(table)
     print_files(written, out or folder)
     job.end()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from .pieces import piece_edges
 
 Array = NDArray[np.float64]
 EVENT_MARGIN = 1e-4  # s, of the rows on either side of a cutoff
+AT_EVENTS = ("mach", "relative_velocity", "altitude", "dynamic_pressure", "mass")
 _LONGEST_LEG = 1.0  # s
 
 
@@ -53,6 +54,9 @@ class MeanFlight:
     events : mapping of str to float
         'release', 'mach_one', 'max_dynamic_pressure', 'tilt_arrest' (of a gravity turn: 'gravity_turn') and the engine
         groups' cutoff events, as far as the flight reaches them (s).
+    at_events : mapping of str to mapping of str to float
+        At each of them ``mach``, ``relative_velocity``, ``altitude``, ``dynamic_pressure`` and ``mass``; at a cutoff
+        just before it.
     """
 
     time: Array
@@ -74,6 +78,7 @@ class MeanFlight:
     surface_range: Array
     liquid: Mapping[str, Array]
     events: Mapping[str, float]
+    at_events: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
 
 def fly(construction: Construction, spacing: float = 1.0) -> MeanFlight:
@@ -112,6 +117,7 @@ def fly(construction: Construction, spacing: float = 1.0) -> MeanFlight:
         **{name: np.array([o[name] for o in observed]) for name in names},
         liquid={t.name: np.array([o[f"liquid.{t.name}"] for o in observed]) for t in construction.tanks},
         events=events,
+        at_events={name: _at_event(ascent, legs, time) for name, time in events.items()},
     )
 
 
@@ -155,6 +161,11 @@ def _row_times(grid: Array, jumps: Iterable[float], begin: float, end: float) ->
         grid = grid[abs(grid[:, None] - jumps).min(axis=1) > 1.5 * EVENT_MARGIN]
     rows = np.unique(np.concatenate([grid, sides, [end] if end not in jumps else []]))
     return rows[(rows > begin) & (rows <= end)]
+
+
+def _at_event(ascent: Ascent, legs: Sequence[Leg], time: float) -> dict[str, float]:
+    observed = ascent.observe(legs[0] if time <= legs[0].begin else _leg_of(legs, time), time)
+    return {name: float(observed[name]) for name in AT_EVENTS}
 
 
 def _leg_of(legs: Sequence[Leg], time: float) -> Leg:

@@ -216,6 +216,21 @@ def test_events_are_where_their_quantities_say(construction, flight):
     assert at >= flight.dynamic_pressure.max()
 
 
+def test_what_holds_at_events_lies_between_the_rows_around_them(flight):
+    assert flight.at_events.keys() == flight.events.keys()
+    assert flight.at_events["mach_one"]["mach"] == pytest.approx(1, abs=1e-9)
+    assert flight.at_events["max_dynamic_pressure"]["dynamic_pressure"] >= flight.dynamic_pressure.max()
+    for event, time in flight.events.items():
+        k = int(np.searchsorted(flight.time, time))
+        if not 0 < k < flight.time.size:
+            continue
+        for name in ("altitude", "mass", "relative_velocity"):
+            low, high = sorted(getattr(flight, name)[k - 1 : k + 1])
+            assert low <= flight.at_events[event][name] <= high, (event, name)
+    release = flight.at_events["release"]
+    assert release["mach"] == 0 and release["mass"] > flight.mass[0]
+
+
 def test_depletion_is_located(construction):
     """Constant flow: the tank is at its residual after (liquid - residual) / (count x flow x share)."""
     lox = next(t.liquid for t in construction.tanks if t.name == "sic_lox")
