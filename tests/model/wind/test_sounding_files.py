@@ -397,3 +397,24 @@ def test_options_that_cannot_be_used(tmp_path):
             read_soundings(file, **options)
     with pytest.raises(UnknownNameError, match="incomplete"):
         read_soundings(file, incomplete="keep")  # pyright: ignore[reportArgumentType]
+
+
+@pytest.mark.parametrize("name", ["igra", "fsl", "own"])
+def test_damaged_files_are_read_or_refused(tmp_path, name):
+    """Characters changed, cut and doubled: what is read is finite, and what is not is refused by a typed error."""
+    random, text = np.random.default_rng(7), TEXTS[name](LEVELS, *rounded(12))
+    letters = list('0123456789 -.,#abZ\n\t[]"\0é')
+    file = tmp_path / "damaged.txt"
+    for _ in range(40):
+        mutant = list(text)
+        for _ in range(int(random.integers(1, 6))):
+            at = int(random.integers(len(mutant)))
+            end = at + int(random.integers(1, 60))
+            part = ([str(random.choice(letters))], [], mutant[at:end] * 2)[int(random.integers(3))]
+            mutant[at : end if not part else at + 1] = part
+        file.write_text("".join(mutant))
+        try:
+            found = read_soundings(file, LEVELS)
+        except DataError:
+            continue
+        assert not np.isinf(found.u).any() and found.u.shape == found.v.shape
