@@ -60,7 +60,7 @@ def forward(falcon1):
     return covariance_equation(falcon1.with_means, TIMES, 1e-8)
 
 
-@pytest.mark.parametrize("engine", ["sweep", Cvodes(relative_tolerance=1e-7)], ids=["sweep", "cvodes"])
+@pytest.mark.parametrize("engine", ["sweep", Cvodes(relative_tolerance=1e-8)], ids=["sweep", "cvodes"])
 @pytest.mark.slow
 def test_engines_meet_the_covariance_equation(falcon1, forward, engine):
     """Moments of 10 to 100 kN m to the accuracy that AS-504's have at 10 MN m: each source, and the mean.
