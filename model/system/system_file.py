@@ -54,8 +54,9 @@ def read_system(file: str | Path) -> LinearSystem:
 def system_of(said: SystemFile, file: Path) -> LinearSystem:
     """Return the system that a TOML file says; as :func:`read_system`."""
     path = file.parent / said.data
-    data = read_arrays(path, said.variables)
-    names = {kind: list(said.names.get(kind, data.names.get(kind, ()))) for kind in PREFIXES}
+    given: dict[str, list[str]] = {str(kind): list(names) for kind, names in said.names.items()}
+    data = read_arrays(path, {str(name): variable for name, variable in said.variables.items()})
+    names = {kind: given.get(kind, list(data.names.get(kind, ()))) for kind in PREFIXES}
     try:
         return LinearSystem.from_arrays(
             data.times,

@@ -37,10 +37,10 @@ def write_resultants_along(case: Case, times: Sequence[float], time: float | Non
     DataError, IntegrationError
     """
     vehicle, written = case.vehicle_for("a resultant along the vehicle"), []
-    ends = sorted({*times, *([] if time is None else [time])})
+    ends = sorted({*map(float, times), *([] if time is None else [float(time)])})
     for load in (load for load in (BENDING_MOMENT, SHEAR_FORCE) if load in known_loads(vehicle)):
         found = resultant_along_vehicle(case, ends, load=load)
-        at = float(found["time"][int(found["level"].max("station").argmax())]) if time is None else time
+        at = float(found["time"][int(found["level"].max("station").values.argmax())]) if time is None else time
         name, text = f"resultant_{load}_along_vehicle", resultants_csv(found)
         written.append(write_whole(folder / f"{name}.csv", lambda p, text=text: p.write_text(text, encoding="utf-8")))
         title = f"{vehicle.title}\nResultant {words(load)} along the vehicle"
