@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import xarray as xr
@@ -157,10 +157,10 @@ def _read_matlab_hdf5(path: Path) -> tuple[dict[str, Any], dict[str, list[str]]]
     try:
         with h5py.File(path, "r") as file:
             for name, value in file.items():
-                if not isinstance(value, h5py.Dataset) or value.size > MOST:
+                if not isinstance(value, h5py.Dataset) or int(value.size or 0) > MOST:
                     continue
                 if value.dtype == h5py.ref_dtype:
-                    cells = [np.ravel(file[ref][()]) for ref in np.ravel(value[()])]
+                    cells = [np.ravel(cast("Any", file[ref])[()]) for ref in np.ravel(value[()])]
                     texts[name] = ["".join(map(chr, cell)) for cell in cells]
                 else:  # columns first on disk
                     array = np.asarray(value[()]).T

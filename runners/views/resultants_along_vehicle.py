@@ -37,7 +37,8 @@ def write_resultants_along(case: Case, times: Sequence[float], time: float | Non
     DataError, IntegrationError
     """
     vehicle, written = case.vehicle_for("a resultant along the vehicle"), []
-    ends = sorted({*map(float, times), *([] if time is None else [float(time)])})
+    wanted = [float(t) for t in times] + ([] if time is None else [time])
+    ends: list[float] = sorted(set(wanted))
     for load in (load for load in (BENDING_MOMENT, SHEAR_FORCE) if load in known_loads(vehicle)):
         found = resultant_along_vehicle(case, ends, load=load)
         at = float(found["time"][int(found["level"].max("station").values.argmax())]) if time is None else time
