@@ -14,7 +14,7 @@ from ..present.terminal import console, errors
 from .flight_load import print_levels
 from .job import SHOWN, Job, load_study, steps
 from .system import run_system
-from .terminal import Changes, Turbulence, number, parse_changes, results_folder
+from .terminal import Changes, OptionalVehicle, Turbulence, number, parse_changes, results_folder
 
 if TYPE_CHECKING:
     from ..flight_load.load import FlightLoad
@@ -26,9 +26,7 @@ if TYPE_CHECKING:
 
 
 def run(
-    vehicle: Annotated[
-        str | None, typer.Argument(help="A shipped vehicle ('ascentwind vehicles') or a vehicle folder.")
-    ] = None,
+    vehicle: OptionalVehicle = None,
     times: Annotated[str | None, typer.Option(help="End times in s: START:STOP:STEP or T1,T2,...")] = None,
     out: Annotated[Path | None, typer.Option(help="Folder for results; VEHICLE-results without it.")] = None,
     engine: Annotated[

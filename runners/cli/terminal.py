@@ -53,6 +53,13 @@ VehicleArgument = Annotated[
         autocompletion=_shipped,
     ),
 ]
+OptionalVehicle = Annotated[
+    str | None,
+    typer.Argument(
+        help="A shipped vehicle ('ascentwind vehicles') or a vehicle folder.",
+        autocompletion=_shipped,
+    ),
+]
 WORD = re.compile(r"(?!(true|false|inf|nan)$)[A-Za-z][A-Za-z_]*")  # no TOML value, and so text
 Changes = Annotated[
     list[str] | None,
