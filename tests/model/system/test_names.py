@@ -186,9 +186,9 @@ def test_what_a_system_cannot_be_made_of_is_said_by_name(changes, message):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"units": {"xx": "m"}}, "no state, output or parameter 'xx'; did you mean 'x'"),
+        ({"units": {"xx": "m"}}, "no state, output, parameter or table 'xx'; did you mean 'x'"),
         ({"units": {"tua": "s"}}, "did you mean 'tau'"),
-        ({"units": {"gust": "m"}}, "no state, output or parameter 'gust'"),
+        ({"units": {"gust": "m"}}, "no state, output, parameter or table 'gust'"),
         ({"scales": {"Y": 1.0}}, "no state or output 'Y'"),
         ({"scales": {"tau": 1.0}}, "no state or output 'tau'"),
         ({"sources": {"gsut": "wind"}}, "no noise 'gsut'; did you mean 'gust'"),

@@ -195,7 +195,7 @@ def test_both_planes_are_refused(cache):
         lambda: study.availability(limits),
         lambda: study.predict_wind([300.0], [5.0], [900.0]),
     ):
-        with pytest.raises(PlanesError, match="flies in both"):
+        with pytest.raises(PlanesError, match="known for one plane alone, which is not how .as504. flies"):
             ask()
 
 
