@@ -30,6 +30,7 @@ class InterruptHandler:
         if self.heard:
             os._exit(INTERRUPTED)
         self.heard = True
+        sys.unraisablehook = lambda _: None  # where the exception is lost Python would print a traceback
         if hasattr(signal, "setitimer"):
             signal.signal(signal.SIGALRM, lambda *_: os._exit(INTERRUPTED))
             signal.setitimer(signal.ITIMER_REAL, PATIENCE)
