@@ -53,7 +53,7 @@ def availability(
     from ..case.times import parse_times
     from ..flight_load.limit_table import Limits
     from ..measured_winds.availability_figure import availability_figure, load_rose
-    from ..present.files import write_whole
+    from ..present.files import write_text
     from ..present.netcdf import one_unit_a_variable, with_conventions, write_netcdf
     from ..present.style import write_figure
     from ..statistics.percentiles import checked_sides
@@ -89,9 +89,7 @@ def availability(
     level["level"].attrs["unit_rule"] = "response"
     whole_file = one_unit_a_variable(level, {"response": units}, words={})
     job.written.append(write_netcdf(with_conventions(whole_file), job.folder / "availability.nc"))
-    job.written.append(
-        write_whole(job.folder / "availability.csv", lambda path: path.write_text(text, encoding="utf-8"))
-    )
+    job.written.append(write_text(job.folder / "availability.csv", text))
     title = study.vehicle_for("availability").title
     heading = f"{title}\n{found.attrs['plane'].capitalize()} plane, winds of {found.attrs['site']}"
     job.written += write_figure(availability_figure(found, heading), job.folder, "availability")
@@ -140,7 +138,7 @@ def months(
     from ...model.errors import UnknownNameError
     from ...model.wind.month_winds import month_file
     from ...model.wind.range_reference import MONTHS, SITE, shipped_two_components
-    from ..present.files import prepare_folder, write_whole
+    from ..present.files import prepare_folder, write_text
     from ..wind.month_fit import fit_month
 
     if soundings is None:
@@ -168,7 +166,7 @@ def months(
             origin = both.zonal.origin
             kept = edition if origin is None or soundings is None else origin.edition
             made = fit_month(both, month, SITE if soundings is None else str(site), kept)
-            write_whole(out / month_file(month), lambda path, made=made: path.write_text(made.text(), encoding="utf-8"))
+            write_text(out / month_file(month), made.text())
             bar.done(month)
     took = time.perf_counter() - begun
     console.print(f"{len(statistics)} months in {out}, {took:.0f} s", soft_wrap=True, highlight=False)

@@ -52,7 +52,7 @@ def day_of_launch(
     """Go or no-go from winds measured some hours before launch, and what drives it."""
     from ..flight_load.limit_table import Limits
     from ..measured_winds.launch_page import launch_figure, launch_page
-    from ..present.files import write_whole
+    from ..present.files import write_text
     from ..present.netcdf import one_unit_a_variable, with_conventions, write_netcdf
     from ..present.style import write_figure
     from ..statistics.percentiles import checked_sides
@@ -80,9 +80,7 @@ def day_of_launch(
     units = [str(unit) for unit in found["unit"].values]
     whole_file = one_unit_a_variable(found.drop_vars("unit"), {"response": units}, words={})
     job.written.append(write_netcdf(with_conventions(whole_file), job.folder / "day_of_launch.nc"))
-    job.written.append(
-        write_whole(job.folder / "day_of_launch.md", lambda path: path.write_text(page, encoding="utf-8"))
-    )
+    job.written.append(write_text(job.folder / "day_of_launch.md", page))
     job.written += write_figure(launch_figure(launch, title), job.folder, "day_of_launch")
     for line in page.splitlines():
         if line.strip() and not line.startswith("!"):

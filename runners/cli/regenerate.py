@@ -16,7 +16,7 @@ from ...codegen.sweep.source import sweep_functions
 from ...codegen.system.executable import executable_system, system_recipe
 from ...codegen.toolchain.cache import describe_changes
 from ...model.system.linear_system import LinearSystem
-from ..present.files import prepare_folder, write_whole
+from ..present.files import prepare_folder, write_text
 from ..study import Study
 
 
@@ -77,7 +77,7 @@ def regenerate(vehicle: str | Path, folder: Path, changes: Mapping[str, Any] | N
         states[path] = (
             f"written ({'; '.join(differences) or ('equations, names or code generator changed' if before else 'new')})"
         )
-        write_whole(path, lambda p, text=text: p.write_text(text, encoding="utf-8"))
+        write_text(path, text)
     return states
 
 

@@ -18,7 +18,7 @@ def reproduce(
     """AS-504 against every figure that NASA CR-103010 published: prediction, options, winds, flight, calibration."""
     from ...model.construction.construction_file import load_construction
     from ...model.vehicle.shipped import find_vehicle
-    from ..present.files import prepare_folder, write_whole
+    from ..present.files import prepare_folder, write_text
     from ..present.style import write_figure
     from ..reproduction.as506.flight import trajectory_checks
     from ..reproduction.as506.loads import load_checks
@@ -50,5 +50,5 @@ def reproduce(
     text = page(Reproduction(predictions, found, winds, checks, calibration, scaled))
     title = "Bending moment of AS-504 at station 25 m under different winds"
     job.written += write_figure(wind_figure(winds, title), out / "figures", "reproduction_winds")
-    job.written.append(write_whole(out / "reproduction.md", lambda p: p.write_text(text, encoding="utf-8")))
+    job.written.append(write_text(out / "reproduction.md", text))
     job.end()

@@ -280,13 +280,13 @@ def _write_azimuths(
     study: Study, azimuths: list[float], end_times: list[float], title: str, folder: Path
 ) -> list[Path]:
     """Write and print the resultants by azimuth."""
-    from ..present.files import write_whole
+    from ..present.files import write_text
     from ..present.style import display, words, write_figure
     from ..views.azimuth_sweep import AZIMUTH, azimuth_csv, azimuth_figure, azimuth_sweep
 
     found = azimuth_sweep(study, azimuths, end_times)
     text, flown = azimuth_csv(found), math.degrees(study.parameters[AZIMUTH].value)
-    written = [write_whole(folder / "azimuths.csv", lambda p: p.write_text(text, encoding="utf-8"))]
+    written = [write_text(folder / "azimuths.csv", text)]
     table = Table("azimuth", title=f"Peaks of resultants by azimuth, passed with {found.attrs['probability']:.3g}")
     names = [str(name) for name in found["resultant"].values]
     units = [display(str(found["unit"].sel(resultant=n).item()), found["level"].sel(resultant=n)) for n in names]

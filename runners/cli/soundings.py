@@ -39,7 +39,7 @@ def read(
     from ...model.wind.soundings.collection import soundings_text
     from ...model.wind.soundings.quality import observed_by_level
     from ...model.wind.soundings.read import read_soundings
-    from ..present.files import prepare_folder, write_whole
+    from ..present.files import prepare_folder, write_text
 
     if latitude is None and longitude is None:
         refuse_unused(context, ["point"], "without --latitude and --longitude, which name a place in a field")
@@ -72,7 +72,7 @@ def read(
         table.add_row(*row)
     console.print(table)
     if out is not None:
-        write_whole(out, lambda path: path.write_text(soundings_text(found), encoding="utf-8"))
+        write_text(out, soundings_text(found))
         console.print(f"written to {out}", soft_wrap=True)
 
 

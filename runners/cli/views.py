@@ -43,7 +43,7 @@ def equations(
     changes: Changes = None,
 ) -> None:
     """The equations and any derivative of them as LaTeX, with the report's symbols."""
-    from ..present.files import write_whole
+    from ..present.files import write_text
     from ..views.equation_latex import equation_latex, equation_names
     from ..views.equation_page import equations_page
 
@@ -54,7 +54,7 @@ def equations(
     study = load_study(vehicle, changes)
     if page is not None:
         text = equations_page(study)
-        write_whole(page, lambda p: p.write_text(text, encoding="utf-8"))
+        write_text(page, text)
         console.print(f"{page} written", soft_wrap=True)
     elif of is not None:
         typer.echo(equation_latex(study, of, by))

@@ -321,7 +321,7 @@ def fit(
     from dataclasses import replace
 
     from ...model.wind.filter_file import filter_text
-    from ..present.files import prepare_folder, write_whole
+    from ..present.files import prepare_folder, write_text
     from ..solvers.least_squares import FitOptions
     from ..wind.fitting.progress import fit_progress
     from ..wind.synthesis.result import SynthesisError
@@ -343,7 +343,7 @@ def fit(
         else f" --soundings {soundings.name} --component {component} --top {s.altitude[-1]:g}"
     )
     made = replace(made, source=f"{made.source}; written by '{command}'")
-    write_whole(out, lambda p: p.write_text(filter_text(made), encoding="utf-8"))
+    write_text(out, filter_text(made))
     state = "converged" if result.converged else f"NOT converged: {result.message}"
     console.print(
         f"{method}, order {result.shaping_filter.order}, {state} in {result.seconds:.1f} s: "

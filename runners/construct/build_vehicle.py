@@ -21,7 +21,7 @@ from ...model.vehicle.plausibility import station_in_name
 from ...model.vehicle.reader import VEHICLE_FILE
 from ...model.vehicle.trial_load import load_trial
 from ...model.vehicle.vehicle_file import TableEntry, VehicleFile, read_vehicle_file
-from ..present.files import prepare_folder, write_whole
+from ..present.files import prepare_folder, write_text
 from .ascent.mean_flight import EVENT_MARGIN, MeanFlight
 from .tables import Columns, table_text, vehicle_tables
 from .vehicle_numbers import Progress, VehicleNumbers, compute_vehicle
@@ -91,7 +91,7 @@ def build_vehicle(
         for name, text in texts.items():
             path = file_inside(target, name)
             prepare_folder(path.parent)
-            write_whole(path, lambda p, text=text: p.write_text(text, encoding="utf-8"))
+            write_text(path, text)
     return numbers, [target / name for name in texts]
 
 

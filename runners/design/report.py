@@ -10,7 +10,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from ..present.files import write_whole
+from ..present.files import write_text
 from ..present.style import display, words, write_figure
 from .design import DesignResult, RecomputedPeak, TradePoint
 from .trade_figure import trade_figure
@@ -73,7 +73,7 @@ def write_design(result: DesignResult, folder: Path) -> list[Path]:
         writer.writerow(("result", q.name, q.unit, f"{q.before:.10g}", f"{q.after:.10g}", limit, f"{q.time_after:g}"))
     for name, multiplier in result.stationarity.multipliers:
         writer.writerow(("active", name, "1", "", f"{multiplier:.6g}", "", ""))
-    return [write_whole(folder / "design.csv", lambda p: p.write_text(buffer.getvalue(), encoding="utf-8"))]
+    return [write_text(folder / "design.csv", buffer.getvalue())]
 
 
 def write_trade(trades: Mapping[str, Sequence[TradePoint]], response: str, title: str, folder: Path) -> list[Path]:
@@ -93,7 +93,7 @@ def write_trade(trades: Mapping[str, Sequence[TradePoint]], response: str, title
                 row += ["", f"{point.result.peak:.10g}", f"{reached:.10g}", str(int(point.result.converged))]
                 row += [f"{point.result.values[n]:.8g}" if n in point.result.values else "" for n in names]
             writer.writerow(row)
-    written = [write_whole(folder / "trade.csv", lambda p: p.write_text(buffer.getvalue(), encoding="utf-8"))]
+    written = [write_text(folder / "trade.csv", buffer.getvalue())]
     if results:
         written += write_figure(trade_figure(trades, response, title), folder, "trade")
     return written

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...model.errors import DataError
 from ..case.case import Case
-from ..present.files import prepare_folder, write_whole
+from ..present.files import prepare_folder, write_text
 
 
 def write_wind(case: Case, altitude: np.ndarray, wind: np.ndarray, path: Path) -> Path:
@@ -42,4 +42,4 @@ def write_wind(case: Case, altitude: np.ndarray, wind: np.ndarray, path: Path) -
     rows = [f"{h:.10g},{x:.10g},{y:.10g}" for h, x, y in zip(altitude, u, v, strict=True)]
     text = "\n".join(["altitude [m],u [m/s],v [m/s]", *rows, ""])
     prepare_folder(path.parent)
-    return write_whole(path, lambda p: p.write_text(text, encoding="utf-8"))
+    return write_text(path, text)

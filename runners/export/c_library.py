@@ -16,7 +16,7 @@ from ...model.system.names import COMBINED, WIND
 from ...model.system.switches import ROUNDINGS
 from ..case.case import Case
 from ..case.times import end_times, parse_times
-from ..present.files import write_whole
+from ..present.files import write_text
 from ..solvers.sweep import LEAST_TOLERANCE, LONGEST_SEGMENT, MOST_SEGMENTS
 from ..solvers.time_nodes import NEAR_START, SAME
 from ..solvers.tolerances import LARGEST_TOLERANCE
@@ -77,10 +77,7 @@ def write_texts(texts: Mapping[str, str], folder: Path) -> list[Path]:
     ------
     OutputFolderError
     """
-    return [
-        write_whole(folder / name, lambda path, text=text: path.write_text(text, encoding="utf-8"))
-        for name, text in texts.items()
-    ]
+    return [write_text(folder / name, text) for name, text in texts.items()]
 
 
 def _default_times(case: Case) -> list[float]:

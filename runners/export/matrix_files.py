@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 from scipy.io import savemat
 
-from ..present.files import write_whole
+from ..present.files import write_text, write_whole
 from ..present.netcdf import write_netcdf
 from .matrix_grid import SHAPES
 
@@ -93,7 +93,7 @@ def _csv(grid: xr.Dataset, folder: Path, name: str) -> list[Path]:
 def _write_csv(rows: list[list[Any]], path: Path) -> Path:
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows([[repr(x) if isinstance(x, float) else x for x in r] for r in rows])
-    return write_whole(path, lambda p: p.write_text(text.getvalue(), encoding="utf-8"))
+    return write_text(path, text.getvalue())
 
 
 FORMATS: dict[str, Callable[[xr.Dataset, Path, str], list[Path]]] = {"netcdf": _netcdf, "mat": _mat, "csv": _csv}

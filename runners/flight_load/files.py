@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from ..present.files import write_whole
+from ..present.files import write_text
 from ..present.netcdf import RULE, one_unit_a_variable, with_conventions, write_netcdf
 from ..statistics.results import ResponseStatistics
 from .load import FlightLoad
@@ -42,7 +42,7 @@ def write_flight_loads(loads: Sequence[FlightLoad], folder: Path) -> list[Path]:
     texts = {"flight_load.csv": _levels_csv(loads), "exceedance.csv": _exceedance_csv(loads)}
     return [
         write_netcdf(flight_dataset(loads), folder / "flight_load.nc"),
-        *(write_whole(folder / n, lambda p, t=t: p.write_text(t, encoding="utf-8")) for n, t in texts.items()),
+        *(write_text(folder / n, t) for n, t in texts.items()),
     ]
 
 
@@ -120,7 +120,7 @@ def write_sensitivities(found: Sequence[xr.Dataset], folder: Path) -> Path:
             values = (f"{float(part[n][k]):.9e}" for n in numbers)
             rows.append((a["response"], a["unit"], f"{a['probability']:g}", f"{a['level']:.9e}", *of, *values))
     text = _csv(rows)
-    return write_whole(folder / "flight_load_sensitivity.csv", lambda p: p.write_text(text, encoding="utf-8"))
+    return write_text(folder / "flight_load_sensitivity.csv", text)
 
 
 def write_passage(passage: Passage, folder: Path) -> list[Path]:
@@ -150,7 +150,7 @@ def write_passage(passage: Passage, folder: Path) -> list[Path]:
     text = _csv(rows)
     return [
         write_netcdf(whole, folder / "limits.nc"),
-        write_whole(folder / "limits.csv", lambda p: p.write_text(text, encoding="utf-8")),
+        write_text(folder / "limits.csv", text),
     ]
 
 

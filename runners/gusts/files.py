@@ -9,7 +9,7 @@ from pathlib import Path
 
 import xarray as xr
 
-from ..present.files import write_whole
+from ..present.files import write_text
 from ..present.netcdf import one_unit_a_variable, with_conventions, write_netcdf
 from .combined import MEANINGS
 from .search import GustSweep
@@ -40,7 +40,7 @@ def write_gusts(sweeps: Sequence[GustSweep], sheets: Sequence[xr.Dataset], folde
         whole = one_unit_a_variable(found, {"response": list(sweep.units)}, words={})
         written.append(write_netcdf(with_conventions(whole), folder / f"gusts_{sweep.gust.name}.nc"))
     for name, text in (("worst_gusts.csv", _worst_csv(sweeps)), ("combined_loads.csv", _sheet_csv(sheets))):
-        written.append(write_whole(folder / name, lambda p, t=text: p.write_text(t, encoding="utf-8")))
+        written.append(write_text(folder / name, text))
     return written
 
 

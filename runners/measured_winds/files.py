@@ -6,7 +6,7 @@ import csv
 import io
 from pathlib import Path
 
-from ..present.files import write_whole
+from ..present.files import write_text
 from ..present.netcdf import one_unit_a_variable, with_conventions, write_netcdf
 from .fly import FlownWinds
 
@@ -40,5 +40,5 @@ def write_flown(flown: FlownWinds, folder: Path) -> list[Path]:
             writer.writerow((response, unit, rank, name, date, f"{value:.9g}", f"{time:g}"))
     return [
         write_netcdf(with_conventions(whole), folder / "flown_winds.nc"),
-        write_whole(folder / "worst_profiles.csv", lambda p: p.write_text(text.getvalue(), encoding="utf-8")),
+        write_text(folder / "worst_profiles.csv", text.getvalue()),
     ]

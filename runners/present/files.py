@@ -71,6 +71,16 @@ def write_whole(path: Path, write: Callable[[Path], object]) -> Path:
     return path
 
 
+def write_text(path: Path, text: str) -> Path:
+    """Write text whole, in UTF-8.
+
+    Raises
+    ------
+    OutputFolderError
+    """
+    return write_whole(path, lambda temporary: temporary.write_text(text, encoding="utf-8"))
+
+
 def write_bytes(path: Path, contents: bytes) -> Path:
     """Write a file whole, and onto the disk before it takes its name.
 

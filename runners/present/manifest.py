@@ -11,7 +11,7 @@ from typing import Any
 
 from ...model.errors import DataError
 from ...model.files.folder_files import file_inside
-from .files import write_whole
+from .files import write_text
 
 MANIFEST = "manifest.json"
 RESULTS = (".nc", ".csv", ".png", ".svg")
@@ -84,7 +84,7 @@ class Manifest:
         entry = {"of": self.of, "ascentwind": version("ascentwind"), "complete": complete, "files": files}
         self.commands[self.command] = entry
         text = json.dumps(self.commands, indent=1, ensure_ascii=False) + "\n"
-        write_whole(self.folder / MANIFEST, lambda p: p.write_text(text, encoding="utf-8"))
+        write_text(self.folder / MANIFEST, text)
 
 
 def _read(folder: Path) -> dict[str, dict[str, Any]]:

@@ -10,7 +10,7 @@ import xarray as xr
 from rich.console import Console
 from rich.table import Table
 
-from ..present.files import write_whole
+from ..present.files import write_text
 from ..present.netcdf import write_netcdf
 from ..present.style import write_figure
 from .derivative_figures import altitude_figure, heading, largest, time_figure, tornado_figure
@@ -52,7 +52,7 @@ def write_sensitivity(found: xr.Dataset, folder: Path) -> list[Path]:
     text = sensitivity_csv(found)
     written = [
         write_netcdf(stored_layout(found), folder / "sensitivity.nc"),
-        write_whole(folder / "sensitivity.csv", lambda p: p.write_text(text, encoding="utf-8")),
+        write_text(folder / "sensitivity.csv", text),
         *write_figure(tornado_figure(found), folder, "sensitivity_tornado"),
     ]
     if "table_elasticity" in found:

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from ...model.errors import DataError
-from ..present.files import write_whole
+from ..present.files import write_text
 from ..present.netcdf import joined, one_unit_a_variable, with_conventions, write_netcdf
 from .instant_levels import LEVEL
 
@@ -23,7 +23,7 @@ def write_statistics(statistics: xr.Dataset, folder: Path) -> list[Path]:
     text = statistics_csv(statistics)
     return [
         write_netcdf(by_response(statistics), folder / NAME),
-        write_whole(folder / "statistics.csv", lambda p: p.write_text(text, encoding="utf-8")),
+        write_text(folder / "statistics.csv", text),
     ]
 
 

@@ -21,7 +21,7 @@ from ...model.errors import ParameterValueError, PlanesError, UnknownNameError
 from ...model.system.names import COMBINED
 from ...model.vehicle.loads import SIDES
 from ...model.vehicle.planes import PLANES, paired
-from ..present.files import prepare_folder, write_whole
+from ..present.files import prepare_folder, write_text
 from ..present.netcdf import RULE, one_unit_a_variable, with_conventions, write_netcdf
 from .norm import NormOfNormal
 from .percentiles import checked_probabilities
@@ -299,7 +299,7 @@ class Resultants:
         text = self._csv()
         return [
             write_netcdf(stored, folder / f"{NAME}.nc"),
-            write_whole(folder / f"{NAME}.csv", lambda p: p.write_text(text, encoding="utf-8")),
+            write_text(folder / f"{NAME}.csv", text),
         ]
 
     def _csv(self) -> str:

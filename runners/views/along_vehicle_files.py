@@ -20,7 +20,7 @@ from ...model.equations.station_loads import load_station_loads
 from ...model.errors import TimeRangeError
 from ...model.system.names import COMBINED
 from ...model.vehicle.vehicle import Vehicle
-from ..present.files import write_whole
+from ..present.files import write_text
 from ..present.netcdf import write_netcdf
 from ..present.style import COLORS, STYLE, display, words, write_figure
 from ..station_loads.loads_along_vehicle import LOADS, every_load_along_vehicle, known_loads
@@ -114,7 +114,7 @@ def write_along_vehicle(
         name, text = f"{found.attrs['load']}_along_vehicle", along_csv(found)
         written += [
             write_netcdf(found, folder / f"{name}.nc"),
-            write_whole(folder / f"{name}.csv", lambda p, text=text: p.write_text(text, encoding="utf-8")),
+            write_text(folder / f"{name}.csv", text),
             *write_figure(along_figure(found, time, vehicle), folder, name),
         ]
     return written, [LargestAlong.of(found) for found in every]

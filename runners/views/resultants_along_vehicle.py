@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from ...model.system.names import COMBINED
 from ...model.vehicle.loads import BENDING_MOMENT, SHEAR_FORCE
 from ..case.case import Case
-from ..present.files import write_whole
+from ..present.files import write_text
 from ..present.style import COLORS, SHADES, STYLE, display, words, wrapped, write_figure
 from ..station_loads.loads_along_vehicle import known_loads, resultant_along_vehicle
 from ..statistics.larger_side import SIGMAS
@@ -43,7 +43,7 @@ def write_resultants_along(case: Case, times: Sequence[float], time: float | Non
         found = resultant_along_vehicle(case, ends, load=load)
         at = float(found["time"][int(found["level"].max("station").values.argmax())]) if time is None else time
         name, text = f"resultant_{load}_along_vehicle", resultants_csv(found)
-        written.append(write_whole(folder / f"{name}.csv", lambda p, text=text: p.write_text(text, encoding="utf-8")))
+        written.append(write_text(folder / f"{name}.csv", text))
         title = f"{vehicle.title}\nResultant {words(load)} along the vehicle"
         written += write_figure(resultants_along_figure(found, at, title), folder, name)
     return written

@@ -27,7 +27,7 @@ from ...model.wind.range_reference import EDITIONS
 from ...model.wind.record import BOTH, COMPONENTS, WindRecord
 from ...model.wind.statistics import TwoComponentStatistics, WindStatistics
 from ...model.wind.two_components import TwoComponentFilter, wind_correlation
-from ..present.files import write_whole
+from ..present.files import write_text
 from ..solvers.least_squares import FitOptions
 from .synthesis.result import SynthesisResult
 from .synthesis.synthesise import synthesise
@@ -256,7 +256,7 @@ def _write(texts: dict[Path, str], toml: Path) -> None:
     new = [path for path in texts if not path.exists()]
     try:
         for path, text in texts.items():
-            write_whole(path, lambda p, text=text: p.write_text(text, encoding="utf-8"))
+            write_text(path, text)
     except BaseException:
         if toml.read_text(encoding="utf-8") != texts[toml]:
             for path in new:

@@ -359,18 +359,18 @@ def test_turbulence_goes_with_any_wind(falcon, no_fit):
 
 def test_a_wind_is_written_whole_or_not_at_all(falcon, no_fit, monkeypatch):
     before = {p.name: p.read_bytes() for p in falcon.iterdir() if p.is_file()}
-    write = wind_apply.write_whole
+    write = wind_apply.write_text
 
     def fails_at(name: str):
-        def broken(path: Path, writer):
+        def broken(path: Path, text: str):
             if path.suffix == name:
                 raise OutputFolderError("disk full")
-            return write(path, writer)
+            return write(path, text)
 
         return broken
 
     for suffix in (".csv", ".json", ".toml"):
-        monkeypatch.setattr(wind_apply, "write_whole", fails_at(suffix))
+        monkeypatch.setattr(wind_apply, "write_text", fails_at(suffix))
         with pytest.raises(OutputFolderError, match="disk full"):
             applied(falcon, period="july")
         assert {p.name: p.read_bytes() for p in falcon.iterdir() if p.is_file()} == before
