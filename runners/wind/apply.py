@@ -8,7 +8,7 @@ import re
 import shutil
 import tempfile
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -116,28 +116,22 @@ def apply_wind(
     highest = float(statistics.altitude[-1])
     record = WindRecord(statistics.origin, azimuth, sign, highest, statistics.source, samples)
     toml = folder / VEHICLE_FILE
-    try:
-        before = toml.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise DataError(f"cannot be read ({error})", file=toml) from None
+    before = _text_of(toml)
     _with_section(
         before, _wind_section(record, "", "", command, before), ("wind",), toml
     )  # told before a fit of a minute
     fit = synthesise(statistics, "state-space", 3, options, noises=2)
     made = replace(fit.shaping_filter, source=f"{fit.shaping_filter.source}; written by '{_line(command)}'")
-    stem = re.sub(r"[^a-z0-9]+", "_", f"wind {statistics.name}".lower()).strip("_")
-    table, coefficients = _table_text(statistics, record, command), filter_text(made)
-    table_file = _unused(folder, stem, ".csv", table)
-    filter_file = _unused(folder, f"{stem}_filter", ".json", coefficients)
-    after = _with_section(
-        before, _wind_section(record, table_file.name, filter_file.name, command, before), ("wind",), toml
-    )
-    texts = {table_file: table, filter_file: coefficients, toml: after}
-    _try(folder, {path.name: text for path, text in texts.items()})
-    _write(texts, toml)
+
+    def naming(table: str, filter_file: str) -> str:
+        return _with_section(before, _wind_section(record, table, filter_file, command, before), ("wind",), toml)
+
+    of = f"wind {statistics.name}"
+    texts = _put_in_place(toml, of, _table_text(statistics, record, command), filter_text(made), naming)
+    table_file, filter_file, _ = texts
     earlier = [_named(before, key) for key in ("statistics", "filter")]
     unused = tuple(name for name in earlier if name not in ("", table_file.name, filter_file.name))
-    return AppliedWind(record, fit, tuple(texts), unused, str(tomllib.loads(after)["title"]))
+    return AppliedWind(record, fit, tuple(texts), unused, str(tomllib.loads(texts[toml])["title"]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,10 +178,7 @@ def apply_components(
     samples = round(min(float(s.independent_samples) for s in (zonal, meridional)), DECIMALS)
     record = WindRecord(origin, azimuth, 1, float(zonal.altitude[-1]), zonal.source, samples)
     toml = folder / VEHICLE_FILE
-    try:
-        before = toml.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise DataError(f"cannot be read ({error})", file=toml) from None
+    before = _text_of(toml)
     _with_components(before, record, "", "", command, toml)
     fits = tuple(synthesise(s, "state-space", 3, options, noises=2) for s in (zonal, meridional))
     made = [replace(f.shaping_filter, source=f"{f.shaping_filter.source}; by '{_line(command)}'") for f in fits]
@@ -195,14 +186,12 @@ def apply_components(
     r, start = fit_noise_correlation(made[0], made[1], zonal.altitude, wanted, deviations)
     filters = TwoComponentFilter(made[0], made[1], r, start)
     own = wind_correlation(filters.joint, filters.zonal.order, zonal.altitude)
+
+    def naming(table: str, filter_file: str) -> str:
+        return _with_components(before, record, table, filter_file, command, toml)
+
     table, coefficients = _components_table(statistics, record, command), two_component_filter_text(filters)
-    stem = re.sub(r"[^a-z0-9]+", "_", f"wind {origin.period} components".lower()).strip("_")
-    table_file = _unused(folder, stem, ".csv", table)
-    filter_file = _unused(folder, f"{stem}_filter", ".json", coefficients)
-    after = _with_components(before, record, table_file.name, filter_file.name, command, toml)
-    texts = {table_file: table, filter_file: coefficients, toml: after}
-    _try(folder, {path.name: text for path, text in texts.items()}, {"planes": BOTH})
-    _write(texts, toml)
+    texts = _put_in_place(toml, f"wind {origin.period} components", table, coefficients, naming, {"planes": BOTH})
     return AppliedComponents(record, (fits[0], fits[1]), float(np.abs(own - wanted).max()), tuple(texts))
 
 
@@ -249,6 +238,34 @@ def _components_table(statistics: TwoComponentStatistics, record: WindRecord, co
         values = [f"{round(float(column[i]), DECIMALS) + 0.0:g}" for column in columns]
         lines.append(",".join([f"{h:.10g}", *values, f"{round(float(statistics.intralevel_correlation[i]), 4):g}"]))
     return "\n".join(lines) + "\n"
+
+
+def _text_of(toml: Path) -> str:
+    try:
+        return toml.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise DataError(f"cannot be read ({error})", file=toml) from None
+
+
+def _put_in_place(
+    toml: Path,
+    name: str,
+    table: str,
+    coefficients: str,
+    naming: Callable[[str, str], str],
+    changes: Mapping[str, Any] | None = None,
+) -> dict[Path, str]:
+    """Write table and filter in files of their own and the vehicle.toml that names them, once it has been tried.
+
+    ``naming`` returns the text of vehicle.toml with the names of both files. Returns what is written, in this order.
+    """
+    folder, stem = toml.parent, re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")
+    table_file = _unused(folder, stem, ".csv", table)
+    filter_file = _unused(folder, f"{stem}_filter", ".json", coefficients)
+    texts = {table_file: table, filter_file: coefficients, toml: naming(table_file.name, filter_file.name)}
+    _try(folder, {path.name: text for path, text in texts.items()}, changes)
+    _write(texts, toml)
+    return texts
 
 
 def _write(texts: dict[Path, str], toml: Path) -> None:
