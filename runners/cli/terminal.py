@@ -46,20 +46,11 @@ def _shipped(incomplete: str) -> list[str]:
     return [name for name in built_in_vehicles() if name.startswith(incomplete)]
 
 
-VehicleArgument = Annotated[
-    str,
-    typer.Argument(
-        help="A shipped vehicle ('ascentwind vehicles') or a vehicle folder.",
-        autocompletion=_shipped,
-    ),
-]
-OptionalVehicle = Annotated[
-    str | None,
-    typer.Argument(
-        help="A shipped vehicle ('ascentwind vehicles') or a vehicle folder.",
-        autocompletion=_shipped,
-    ),
-]
+_VEHICLE = typer.Argument(
+    help="A shipped vehicle ('ascentwind vehicles') or a vehicle folder.", autocompletion=_shipped
+)
+VehicleArgument = Annotated[str, _VEHICLE]
+OptionalVehicle = Annotated[str | None, _VEHICLE]
 WORD = re.compile(r"(?!(true|false|inf|nan)$)[A-Za-z][A-Za-z_]*")  # no TOML value, and so text
 Changes = Annotated[
     list[str] | None,
