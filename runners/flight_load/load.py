@@ -33,7 +33,7 @@ from .request import SpacingWarning, checked_draws, checked_level, refuse_withou
 from .response import ResponseInWindow
 from .sampling import draw_beyond
 from .sensitivity import level_sensitivity
-from .uncertain_parameter import checked_spread, uncertain_level
+from .uncertain_parameter import checked_spread, processes_of, uncertain_level
 from .upcrossings import upcrossing_rate
 from .wind_interval import wind_intervals
 from .window import checked_window
@@ -217,10 +217,9 @@ class FlightLoad:
                 )
             spread = float(1 / np.sqrt(2 * (checked_samples(None, self.wind_samples) - 1)))
         asked = checked_spread(spread)
+        processes, draws = processes_of(self.of, parameter, asked), max(200, self.draws // 4)
         found = [
-            uncertain_level(
-                self.of, level, p, self.sides, parameter, asked, self._random(6, k), max(200, self.draws // 4)
-            )
+            uncertain_level(processes, level, p, self.sides, self._random(6, k), draws)
             for k, (p, level) in enumerate(zip(self.probabilities, self.levels, strict=True))
         ]
         name = f"level that flights pass with {parameter} uncertain by {100 * asked:.3g} %"

@@ -21,6 +21,12 @@ LEAST_MARGIN = 0.02  # and at least so much of its size
 SLOPE_STEP = 0.2  # of ln P, over which its slope is taken
 
 
+def interval_of(probability: float, standard_error: float) -> tuple[float, float]:
+    """Return the 95 % interval of a probability, within 0 and 1."""
+    half = CONFIDENCE * standard_error
+    return max(0.0, probability - half), min(1.0, probability + half)
+
+
 @dataclass(frozen=True)
 class Estimate:
     """A probability, with what is not known of it.
@@ -49,8 +55,7 @@ class Estimate:
     @property
     def interval(self) -> tuple[float, float]:
         """95 % interval of the sampling."""
-        half = CONFIDENCE * self.standard_error
-        return max(0.0, self.value - half), min(1.0, self.value + half)
+        return interval_of(self.value, self.standard_error)
 
 
 def estimate(draws: Draws, boundary: Boundary) -> Estimate:

@@ -28,7 +28,7 @@ from ..solvers.markov_chain import MarkovChain
 from ..statistics.norm import NormOfNormal
 from ..statistics.percentiles import checked_probabilities
 from ..statistics.resultants import resultant_pairs
-from .probability import CONFIDENCE, ORDER, root_between
+from .probability import CONFIDENCE, ORDER, interval_of, root_between
 from .request import NoVarianceError, checked_draws, checked_level
 from .window import checked_window, window_chain
 
@@ -198,8 +198,7 @@ class ResultantEstimate:
     @property
     def interval(self) -> tuple[float, float]:
         """95 % interval of the sampling."""
-        half = CONFIDENCE * self.standard_error
-        return max(0.0, self.value - half), min(1.0, self.value + half)
+        return interval_of(self.value, self.standard_error)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -7,6 +7,7 @@ parameter's normal law, by Gauss-Hermite quadrature.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.polynomial.hermite_e import hermegauss
@@ -16,6 +17,7 @@ from ...model.errors import ParameterValueError, UnknownNameError
 from ..statistics.percentiles import Sides
 from .crossings import Boundary
 from .probability import SOLVED, Level
+from .process import OneOutput
 from .response import ResponseInWindow
 from .sampling import Draws, draw_beyond
 
@@ -24,26 +26,34 @@ NEARER = 0.05  # of the level, within which the level of the mixture is looked f
 MOST_NEARER = 12  # times
 
 
-def uncertain_level(
-    of: ResponseInWindow,
-    level: Level,
-    probability: float,
-    sides: Sides,
-    parameter: str,
-    spread: float,
-    random: np.random.Generator,
-    count: int,
-) -> tuple[float, float]:
-    """Return a level and its standard error; see :meth:`FlightLoad.level_with_uncertain`."""
+def processes_of(of: ResponseInWindow, parameter: str, spread: float) -> list[OneOutput]:
+    """Return the response with the parameter at each node of the quadrature.
+
+    Raises
+    ------
+    UnknownNameError, ParameterValueError
+    """
     known = of.case.parameters
     if parameter not in known:
         raise UnknownNameError("parameter", str(parameter), list(known))
     value = known[parameter].value
-    nodes, weights = hermegauss(NODES)
-    weights = weights / weights.sum()
     if not value:
         raise ParameterValueError(f"'{parameter}' is 0, of which a relative spread is none")
-    processes = [of.with_parameters({parameter: value * (1 + spread * x)}).process() for x in nodes]
+    nodes, _ = hermegauss(NODES)
+    return [of.with_parameters({parameter: value * (1 + spread * x)}).process() for x in nodes]
+
+
+def uncertain_level(
+    processes: Sequence[OneOutput],
+    level: Level,
+    probability: float,
+    sides: Sides,
+    random: np.random.Generator,
+    count: int,
+) -> tuple[float, float]:
+    """Return a level and its standard error; see :meth:`FlightLoad.level_with_uncertain`."""
+    _, weights = hermegauss(NODES)
+    weights = weights / weights.sum()
 
     def boundary(u: float) -> Boundary:
         return Boundary.around(np.full(processes[0].seen.mean.shape, u), sides)
