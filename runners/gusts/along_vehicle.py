@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import xarray as xr
 
@@ -45,7 +47,7 @@ def gust_along_vehicle(
     weights = weights_of_rows(case, [worst.time], [(rows.state[0], rows.direct[0, :, wind])], reach)[0]
     own = gust_products(weights, climb, worst.gust, np.array([worst.start_altitude]))[0]
     starts = sweep.starts(weights)
-    found = np.array([gust_products(weights, climb, sweep.gust.of_length(L), starts) for L in sweep.lengths])
+    found = np.array([gust_products(weights, climb, replace(sweep.gust, length=L), starts) for L in sweep.lengths])
     flat = np.abs(found).reshape(-1, found.shape[2])
     best = flat.argmax(axis=0)
     q, p = np.unravel_index(best, found.shape[:2])

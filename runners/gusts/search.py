@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -164,7 +164,9 @@ class GustSweep:
     def _at(self, weights: WindWeights, names: Sequence[str]) -> tuple[NDArray, NDArray, NDArray]:
         """Return largest responses and their starts, (r, q), and whether the search ended too early, (r,)."""
         time, span, starts = weights.time, weights.time - weights.begin, self.starts(weights)
-        found = np.array([gust_products(weights, self.climb, self.gust.of_length(L), starts) for L in self.lengths])
+        found = np.array(
+            [gust_products(weights, self.climb, replace(self.gust, length=L), starts) for L in self.lengths]
+        )
         best = np.abs(found).argmax(axis=1)  # (q, r), of (q, starts, r)
         largest = np.take_along_axis(found, best[:, None], axis=1)[:, 0].T
         of_all = best.T[np.arange(len(names)), np.abs(largest).argmax(axis=1)]
@@ -202,14 +204,16 @@ class GustSweep:
             tries = np.unique(np.clip(length + wide * np.linspace(-1, 1, ZOOM), low, high))
             times = np.unique(np.clip(met + step * np.linspace(-1, 1, ZOOM), weights.begin, weights.time))
             at = self.climb.altitude(times)
-            found = np.array([gust_products(weights, self.climb, self.gust.of_length(L), at)[:, 0] for L in tries])
+            found = np.array(
+                [gust_products(weights, self.climb, replace(self.gust, length=L), at)[:, 0] for L in tries]
+            )
             i, j = np.unravel_index(int(np.abs(found).argmax()), found.shape)
             if abs(found[i, j]) >= abs(value):
                 length, met, value = float(tries[i]), float(times[j]), float(found[i, j])
             wide, step = wide / FINER, step / FINER
         unit = self.units[self.responses.index(name)]
         start = float(self.climb.altitude(met))
-        return WorstGust(name, unit, value, weights.time, self.gust.of_length(length), start, met)
+        return WorstGust(name, unit, value, weights.time, replace(self.gust, length=length), start, met)
 
     def __repr__(self) -> str:
         lines = [
@@ -267,5 +271,5 @@ def _checked_lengths(gust: Gust, lengths: Iterable[float] | None) -> NDArray[np.
     if not found:
         raise ParameterValueError("no length of a gust was given; give metres, such as [60, 150, 300]")
     for length in found:
-        gust.of_length(length)
+        replace(gust, length=length)
     return np.array(found)

@@ -1,14 +1,14 @@
 """Shapes of discrete gusts over altitude.
 
 Each is the wind W(s) at s metres above the gust's start, smooth between its corners. Lengths are along altitude, not
-along the path, which is longer by 1 / sin(flight path angle).
+along the path, which is longer by 1 / sin(flight path angle). ``shortest`` is the least length that a shape can have, m;
+``holds``: the wind stays what it is at the last corner, where it is zero beyond in the others.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,48 +22,6 @@ EDGE = 30.0  # m, of the same
 
 class GustError(AscentwindError):
     """A gust has no such size, or does not lie on the flight."""
-
-
-class Gust(Protocol):
-    """A shape: wind over the distance from where the gust starts."""
-
-    @property
-    def name(self) -> str:
-        """Of the shape, as the command line takes it."""
-        ...
-
-    @property
-    def amplitude(self) -> float:
-        """Largest wind, m/s; negative blows to the other side."""
-        ...
-
-    @property
-    def length(self) -> float:
-        """From the start to where the wind is zero again, or no longer grows, m."""
-        ...
-
-    @property
-    def shortest(self) -> float:
-        """The least length that the shape can have, m."""
-        ...
-
-    @property
-    def corners(self) -> tuple[float, ...]:
-        """Distances from the start, m, increasing, between which the wind is smooth; zero before the first."""
-        ...
-
-    @property
-    def holds(self) -> bool:
-        """Whether the wind stays what it is at the last corner, or is zero beyond."""
-        ...
-
-    def of_length(self, length: float) -> Self:
-        """Return the same shape with another length (m)."""
-        ...
-
-    def at(self, distance: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the wind (m/s) at distances (m) from the start."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -96,24 +54,6 @@ class OneMinusCosine:
     def corners(self) -> tuple[float, ...]:
         """Distances from the start, m, between which the wind is smooth."""
         return 0.0, self.length
-
-    def of_length(self, length: float) -> OneMinusCosine:
-        """Return the same shape with another length.
-
-        Parameters
-        ----------
-        length : float
-            m.
-
-        Returns
-        -------
-        OneMinusCosine
-
-        Raises
-        ------
-        GustError
-        """
-        return OneMinusCosine(length, self.amplitude)
 
     def at(self, distance: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the wind at distances from the start.
@@ -177,24 +117,6 @@ class QuasiSquare:
         """Distances from the start, m, between which the wind is smooth."""
         return tuple(sorted({0.0, self.edge, self.length - self.edge, self.length}))
 
-    def of_length(self, length: float) -> QuasiSquare:
-        """Return the same shape with another length.
-
-        Parameters
-        ----------
-        length : float
-            m.
-
-        Returns
-        -------
-        QuasiSquare
-
-        Raises
-        ------
-        GustError
-        """
-        return QuasiSquare(length, self.amplitude, self.edge)
-
     def at(self, distance: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the wind at distances from the start.
 
@@ -245,24 +167,6 @@ class RampAndHold:
         """Distances from the start, m, between which the wind is smooth."""
         return 0.0, self.length
 
-    def of_length(self, length: float) -> RampAndHold:
-        """Return the same shape with another length.
-
-        Parameters
-        ----------
-        length : float
-            m.
-
-        Returns
-        -------
-        RampAndHold
-
-        Raises
-        ------
-        GustError
-        """
-        return RampAndHold(length, self.amplitude)
-
     def at(self, distance: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the wind at distances from the start.
 
@@ -279,16 +183,15 @@ class RampAndHold:
         return self.amplitude * _rise(distance, self.length)
 
 
-SHAPES: dict[str, type[OneMinusCosine] | type[QuasiSquare] | type[RampAndHold]] = {
-    shape.name: shape for shape in (OneMinusCosine, QuasiSquare, RampAndHold)
-}
+Gust = OneMinusCosine | QuasiSquare | RampAndHold
+SHAPES: dict[str, type[Gust]] = {shape.name: shape for shape in (OneMinusCosine, QuasiSquare, RampAndHold)}
 
 
 def _rise(distance: NDArray[np.float64], over: float) -> NDArray[np.float64]:
     return 0.5 * (1 - np.cos(np.pi * np.clip(distance / over, 0.0, 1.0)))
 
 
-def _check(gust: OneMinusCosine | QuasiSquare | RampAndHold) -> None:
+def _check(gust: Gust) -> None:
     """Raise if a length or an amplitude is none."""
     for what, value in (("length", gust.length), ("amplitude", gust.amplitude)):
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
