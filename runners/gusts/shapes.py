@@ -1,8 +1,8 @@
 """Shapes of discrete gusts over altitude.
 
 Each is the wind W(s) at s metres above the gust's start, smooth between its corners. Lengths are along altitude, not
-along the path, which is longer by 1 / sin(flight path angle). ``shortest`` is the least length that a shape can have, m;
-``holds``: the wind stays what it is at the last corner, where it is zero beyond in the others.
+along the path, which is longer by 1 / sin(flight path angle). ``shortest`` is the least length that a shape can have,
+m; ``holds``: the wind stays what it is at the last corner, where it is zero beyond in the others.
 """
 
 from __future__ import annotations
