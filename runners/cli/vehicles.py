@@ -71,7 +71,7 @@ def build_vehicle(
             bar.done()
     flight = numbers.flight
     table = Table("event", title=f"Mean flight of {numbers.construction.name}")
-    for column in ("time (s)", "Mach", "speed (m/s)", "altitude (km)", "q (kPa)", "mass (t)"):
+    for column in ("time\n(s)", "Mach", "speed\n(m/s)", "altitude\n(km)", "q\n(kPa)", "mass\n(t)"):
         table.add_column(column, justify="right", no_wrap=True)
     for event, time in sorted(flight.events.items(), key=lambda item: item[1]):
         at = flight.at_events[event]

@@ -12,6 +12,7 @@ import resource
 import shutil
 import sys
 import tempfile
+import tomllib
 import traceback
 import warnings
 from collections.abc import Iterator
@@ -216,7 +217,7 @@ def _filter(work: Path, kind: str, random: Random) -> tuple[Mutation, float]:
     name = random.choice(sorted(built_in_vehicles()))
     folder = work / name
     shutil.copytree(built_in_vehicles()[name], folder)
-    (file,) = (p.name for p in folder.glob("*filter.json"))
+    file = tomllib.loads((folder / "vehicle.toml").read_text())["wind"]["filter"]
     return _spoiled_vehicle(name, folder, file, kind, random)
 
 
