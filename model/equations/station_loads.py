@@ -34,6 +34,7 @@ KEYS = {
     AXIAL_FORCE: "axial_along_vehicle",
 }
 SAME_STATION = 1e-6  # m
+SAME_GIMBAL = 1e-3  # m
 DIFFERENT = 1e-3  # of the largest coefficient
 
 
@@ -140,7 +141,17 @@ def load_station_loads(vehicle: Vehicle, load: str = BENDING_MOMENT) -> StationL
 
 def _compare(vehicle: Vehicle, quantity: str, along: StationLoads, file: Path) -> None:
     """Warn where a load's own table and the stations along the vehicle tell of different vehicles."""
-    for load in vehicle.file.loads:
+    gimbal = along.station[0] - along.forward_of_gimbal[0]
+    for i, load in enumerate(vehicle.file.loads):
+        own_gimbal = gimbal if load.forward_of_gimbal_m is None else load.station_m - load.forward_of_gimbal_m
+        if abs(own_gimbal - gimbal) > SAME_GIMBAL:
+            warnings.warn(
+                f"{vehicle.folder / 'vehicle.toml'}, column 'loads.{i}.forward_of_gimbal_m': is "
+                f"{load.forward_of_gimbal_m:g} m, which puts the gimbal plane at station {own_gimbal:g} m; {file.name} "
+                f"puts it at {gimbal:g} m; correct one",
+                PlausibilityWarning,
+                stacklevel=3,
+            )
         k = int(np.argmin(np.abs(along.station - load.station_m)))
         entry = {BENDING_MOMENT: load.table, SHEAR_FORCE: load.shear, AXIAL_FORCE: load.axial}[quantity]
         if entry is None or abs(along.station[k] - load.station_m) > SAME_STATION:

@@ -323,6 +323,15 @@ def test_area_of_the_construction(tmp_path):
         compare_stated_twice(vehicle)
 
 
+def test_gimbal_plane_of_a_load_and_of_the_stations(tmp_path):
+    """AS-504 has one load, so that no other says where the plane is."""
+    toml = copied("as504", tmp_path) / "vehicle.toml"
+    toml.write_text(toml.read_text().replace("forward_of_gimbal_m = 22.46", "forward_of_gimbal_m = 21.46"))
+    vehicle = load_vehicle(toml.parent)
+    with pytest.warns(PlausibilityWarning, match=r"at station 3.54 m; loads_along_vehicle.csv puts it at 2.54 m"):
+        compare_stated_twice(vehicle)
+
+
 @pytest.mark.parametrize("case", BESIDE)
 def test_tables_beside_those_of_the_equations(tmp_path, case):
     file, change, message = BESIDE[case]
