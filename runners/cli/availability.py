@@ -9,7 +9,7 @@ import typer
 from rich.table import Table
 
 from ...model.errors import DataError, ParameterValueError, TimeRangeError
-from ..present.terminal import console
+from ..present.terminal import console, print_table
 from .flight_load import parse_window
 from .job import Job, load_study, steps
 from .soundings import parse_months
@@ -113,7 +113,7 @@ def availability(
                 cell += f"\nstops {100 * float(at['stopped']):.0f} %, then {float(at['remaining_risk']):.1g}"
             cells.append(cell)
         table.add_row(str(month), *cells)
-    console.print(table)
+    print_table(table, console)
     console.print(
         "The files hold, and few azimuths show, 90 % by the sampling of the wind's statistics alone: errors of "
         "filters, of reconstructed correlations and of the model are not in them.",

@@ -9,7 +9,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from ..present.terminal import console
+from ..present.terminal import console, print_table
 from .job import Job, load_study, steps
 from .terminal import Changes, Turbulence, VehicleArgument, results_folder, whole
 
@@ -116,7 +116,7 @@ def tolerance(
     for engine in dict.fromkeys(m.engine for m in measured):
         rows = [m for m in measured if m.engine == engine]
         table.add_row(engine, *(f"{m.error:.0e}  {1e3 * m.seconds:.0f} ms" for m in rows))
-    console.print(table)
+    print_table(table, console)
     table = Table("flight time", title="What paces the step of CVODES (Adams, 1e-7)")
     for column in ("fastest root, rad/s", "in", "limit 2/|root|", "step, functional", "step, Newton"):
         table.add_column(column, justify="right")
@@ -128,7 +128,7 @@ def tolerance(
             f"{1e3 * pace.functional_limit:.0f} ms", f"{1e3 * pace.functional_step:.0f} ms",
             f"{1e3 * pace.newton_step:.0f} ms", _root(pace.accuracy_root), pace.pacing_state,
         )  # fmt: skip
-    console.print(table)
+    print_table(table, console)
     figure = tolerance_figure(measured, paces, f"{study.system.name}: end times {named} s")
     job.written += write_figure(figure, job.folder, "tolerance")
     job.end()

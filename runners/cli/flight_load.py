@@ -10,7 +10,7 @@ from rich.table import Table
 
 from ...model.errors import AscentwindError, TimeRangeError, UnusedOptionError
 from ...model.files.numbers import parse_number
-from ..present.terminal import console, errors
+from ..present.terminal import console, errors, print_table
 from .job import Job, load_study, steps
 from .terminal import Changes, Turbulence, VehicleArgument, number, results_folder, whole
 
@@ -167,7 +167,7 @@ def print_levels(loads: list[FlightLoad]) -> None:
                 side if share > ONE_SIDE else f"{side} {100 * share:.0f} %", f"{factor * half:.2g}",
                 f"{factor * instant:.4g} {unit}", f"{found.value / instant:.3f}",
             )  # fmt: skip
-    console.print(table)
+    print_table(table, console)
 
 
 def print_wind_intervals(loads: list[FlightLoad]) -> None:
@@ -192,7 +192,7 @@ def print_wind_intervals(loads: list[FlightLoad]) -> None:
                 relative = f"{100 * (low / found.value - 1):+.1f} % {100 * (high / found.value - 1):+.1f} %"
                 ends = (f"{factor * x:.4g} {unit}" for x in (low, high))
                 table.add_row(words(load.response), f"{p:g}", *ends, relative if found.value > 0 else "")
-        console.print(table)
+        print_table(table, console)
         console.print(
             "By sampling of the wind alone: errors of its filter, of reconstructed correlations and of the model are "
             "not in them.", style="dim", soft_wrap=True,
@@ -238,7 +238,7 @@ def _print_uncertain(loads: list[FlightLoad], wind_error: float) -> None:
                 more = f"{100 * (float(found[k]) / load.levels[k].value - 1):+.2g} %"
                 table.add_row(words(load.response), f"{p:g}", f"{factor * float(found[k]):.4g} {unit}", half, more)
             bar.done(words(load.response))
-    console.print(table)
+    print_table(table, console)
 
 
 def print_sensitivity(found: xr.Dataset) -> None:
@@ -256,7 +256,7 @@ def print_sensitivity(found: xr.Dataset) -> None:
         table.add_row(
             str(name), value, f"{float(found['elasticity'][k]):+.4f}", f"{float(found['derivative'][k]):+.4g}"
         )
-    console.print(table)
+    print_table(table, console)
 
 
 def print_loads(loads: list[FlightLoad]) -> None:
@@ -271,7 +271,7 @@ def print_loads(loads: list[FlightLoad]) -> None:
     for load in loads:
         shares = load.shares["share"].isel(probability=0).values
         table.add_row(words(load.response), *(f"{100 * share:.2f} %" for share in shares))
-    console.print(table)
+    print_table(table, console)
     for load in loads:
         if load.limits is not None:
             passage = load.passage
@@ -299,7 +299,7 @@ def print_passage(passage: Passage) -> None:
         left = f"{factor * margin[at, r]:.3g} {unit}"
         side = passage.sides if passage.sides != "both" else "lower" if mean[at, r] < 0 else "upper"
         table.add_row(str(load), f"{chance[r]:.3g}", left, side, f"{times[at]:.4g} s")
-    console.print(table)
+    print_table(table, console)
     console.print(
         f"Any of {len(passage.loads)} limits is passed by {p.value:.3g} of flights (95 %: {p.interval[0]:.2g} to "
         f"{p.interval[1]:.2g}), jointly; the worst single instant would say {p.largest_instant:.2g}, adding the "

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.table import Table
 
-from ..present.terminal import console
+from ..present.terminal import console, print_table
 from .job import Job, load_study
 from .soundings import parse_levels
 from .terminal import Changes, VehicleArgument, refuse_unused, results_folder, whole
@@ -69,7 +69,7 @@ def fly(
         unit = study.system.outputs[study.system.output_index(name)].unit
         for profile, date, value, time in flown.worst(name, SHOWN):
             table.add_row(profile, date, f"{value:.4g} {unit}", f"{time:g}")
-        console.print(table)
+        print_table(table, console)
     job.end()
 
 
@@ -92,7 +92,7 @@ def print_flown(flown: FlownWinds) -> None:
             " / ".join(f"{factor * np.quantile(x, p):.4g}" for x in (measured, predicted)) for p in (0.5, 0.95, 0.99)
         ]
         table.add_row(words(name), *cells, f"{factor * np.abs(flown.values[:, :, r]).max():.4g} {shown}")
-    console.print(table)
+    print_table(table, console)
     missed = flown.missed_share.max(axis=0)
     console.print(
         f"Winds straight between their levels miss up to {100 * missed.max():.1f} % of the wind's variance "

@@ -9,7 +9,7 @@ import typer
 from rich.table import Table
 
 from ...model.errors import UnknownNameError
-from ..present.terminal import console
+from ..present.terminal import console, print_table
 from .job import Job, load_study, steps
 from .terminal import Changes, Turbulence, VehicleArgument, number, results_folder
 
@@ -120,7 +120,7 @@ def print_gusts(sweeps: list[GustSweep], sheets: list[xr.Dataset]) -> None:
                 words(name), words(w.gust.name), f"{factor * w.value:.4g} {unit}", f"{w.time:.2f} s",
                 f"{w.gust.length:.0f} m", f"{w.start_altitude:.0f} m",
             )  # fmt: skip
-    console.print(table)
+    print_table(table, console)
     columns = ("mean", "random_wind", "gust", "vehicle", "root_sum_square", "joint_inside", "joint_worst")
     for sweep, sheet in zip(sweeps, sheets, strict=True):
         table = Table("response", title=f"Combined loads at the time of the worst {words(sweep.gust.name)} gust")
@@ -130,7 +130,7 @@ def print_gusts(sweeps: list[GustSweep], sheets: list[xr.Dataset]) -> None:
             values = [float(sheet[column][k]) for column in columns]
             factor, unit = display(sweep.units[k], values)
             table.add_row(f"{words(name)}, {unit}", *(f"{factor * value:.4g}" for value in values))
-        console.print(table)
+        print_table(table, console)
     console.print(
         "Random wind and vehicle: 3 sigma. Joint: passed by 0.00135 of flights that are inside the gust at that time "
         "from either side, or meet it where it does most harm. The random wind holds scales down to some hundred "

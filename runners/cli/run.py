@@ -10,7 +10,7 @@ import typer
 from rich.table import Table
 
 from ...model.errors import AscentwindError, UnusedOptionError
-from ..present.terminal import console, errors
+from ..present.terminal import console, errors, print_table
 from .flight_load import print_levels
 from .job import SHOWN, Job, load_study, steps
 from .system import run_system
@@ -236,13 +236,13 @@ def _print_peaks(statistics: ResponseStatistics) -> None:
         factor, unit = display(peak.unit, peak.value)
         value, mean, std = (f"{factor * x:.4g} {unit}" for x in (peak.value, peak.mean, peak.std))
         table.add_row(words(peak.response), f"{peak.time:g} s{'*' if peak.at_end else ''}", value, peak.side, mean, std)
-    console.print(table)
+    print_table(table, console)
     table = Table("response", title="Share of the variance at the peak")
     for source in found[0].shares:
         table.add_column(words(source), justify="right")
     for peak in found:
         table.add_row(words(peak.response), *(f"{100 * share:.2f} %" for share in peak.shares.values()))
-    console.print(table)
+    print_table(table, console)
     at_end = any(peak.at_end for peak in found)
     if at_end:
         console.print("* on the first or last end time asked for; the peak of the flight may lie beyond", style="dim")
@@ -261,7 +261,7 @@ def _print_instant_levels(statistics: ResponseStatistics, probability: float) ->
         factor, unit = display(str(at["unit"].item()), float(at))
         time = f"{float(at['time']):g} s"
         table.add_row(words(str(name)), time, f"{factor * float(at):.4g} {unit}", str(at["side"].item()))
-    console.print(table)
+    print_table(table, console)
 
 
 def _resultant_figures(both: Resultants, title: str, folder: Path) -> list[Path]:
@@ -297,7 +297,7 @@ def _write_azimuths(
     for azimuth, row in zip(found["azimuth"].values, found["level"].values, strict=True):
         values = (f"{factor * value:.4g}" for (factor, _), value in zip(units, row, strict=True))
         table.add_row(f"{azimuth:g}°", *values)
-    console.print(table)
+    print_table(table, console)
     return written
 
 
@@ -314,7 +314,7 @@ def _print_resultants(both: Resultants) -> None:
             angles = (f"{math.degrees(angle):.0f}°" for angle in (peak.direction, peak.spread))
             time = f"{peak.time:g} s{'*' if peak.at_end else ''}"
             table.add_row(words(peak.resultant), time, f"{level} {unit}", *angles, first, second)
-        console.print(table)
+        print_table(table, console)
     console.print(
         "Direction from +pitch (nose pitching over) towards +yaw (to the right); a norm has no mean + 3 sigma.",
         style="dim",
@@ -332,4 +332,4 @@ def _print_along(found: list[LargestAlong]) -> None:
         factor, unit = display(load.unit, load.value)
         value = f"{factor * load.value:.4g} {unit}"
         table.add_row(words(load.load), value, load.side, f"{load.station:.4g} m", f"{load.time:g} s")
-    console.print(table)
+    print_table(table, console)

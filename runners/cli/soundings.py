@@ -10,7 +10,7 @@ from rich.table import Table
 
 from ...model.errors import DataError
 from ...model.files.numbers import parse_number
-from ..present.terminal import console
+from ..present.terminal import console, print_table
 from .terminal import number, refuse_unused
 
 MOST = 10_000  # levels
@@ -70,7 +70,7 @@ def read(
             seen = values[values == values]
             row += [f"{seen.mean():.2f}" if seen.size else "", f"{seen.std(ddof=1):.2f}" if seen.size > 1 else ""]
         table.add_row(*row)
-    console.print(table)
+    print_table(table, console)
     if out is not None:
         write_text(out, soundings_text(found))
         console.print(f"written to {out}", soft_wrap=True)

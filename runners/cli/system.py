@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from rich.table import Table
 
 from ...model.errors import UnusedOptionError
-from ..present.terminal import console
+from ..present.terminal import console, print_table
 from .job import Job, steps
 from .terminal import results_folder
 
@@ -84,4 +84,4 @@ def _print_peaks(statistics: ResponseStatistics) -> None:
     for peak in statistics.peaks():
         numbers = (f"{x:.4g}" for x in (peak.value, peak.mean, peak.std))
         table.add_row(words(peak.response), f"{peak.time:g} s", *numbers, peak.unit)
-    console.print(table)
+    print_table(table, console)

@@ -10,7 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from ...model.errors import UnusedOptionError
-from ..present.terminal import console
+from ..present.terminal import console, print_table
 from .job import checked_changes
 from .terminal import Changes
 
@@ -44,7 +44,7 @@ def doctor() -> None:
     verdicts = diagnose()
     for line in verdicts:
         table.add_row(line.what, line.found, Text("ok", "green") if line.good else Text(line.advice, "yellow"))
-    console.print(table)
+    print_table(table, console)
 
 
 def cache(

@@ -10,7 +10,7 @@ from rich.table import Table
 
 from ...model.errors import OutputFolderError
 from ...model.vehicle.shipped import built_in_vehicles
-from ..present.terminal import console
+from ..present.terminal import console, print_table
 from .job import Job, print_files, steps
 from .terminal import number
 
@@ -24,7 +24,7 @@ def vehicles() -> None:
     for name, folder in built_in_vehicles().items():
         vehicle = load_vehicle(folder)
         table.add_row(name, vehicle.title, f"{vehicle.start:g} - {vehicle.end:g}", str(folder))
-    console.print(table)
+    print_table(table, console)
 
 
 def new_vehicle(
@@ -79,6 +79,6 @@ def build_vehicle(
             event.replace("_", " "), f"{time:.2f}", f"{at['mach']:.3f}", f"{at['relative_velocity']:.1f}",
             f"{at['altitude'] / 1e3:.2f}", f"{at['dynamic_pressure'] / 1e3:.2f}", f"{at['mass'] / 1e3:.1f}",
         )  # fmt: skip
-    console.print(table)
+    print_table(table, console)
     print_files(written, out or folder)
     job.end()

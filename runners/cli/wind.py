@@ -10,7 +10,7 @@ import typer
 from rich.table import Table
 
 from ...model.errors import DataError, OutputFolderError
-from ..present.terminal import console
+from ..present.terminal import console, print_table
 from .availability import months
 from .job import Job, load_study, steps
 from .soundings import read
@@ -270,7 +270,7 @@ def stats(
         below = f"{s.correlation[i, i - 1]:.3f}" if i else ""
         interval = f"{np.sqrt(low[i, i]):.2f} - {np.sqrt(high[i, i]):.2f}"
         table.add_row(f"{h:g}", f"{s.mean[i]:.2f}", f"{s.standard_deviation[i]:.2f}", interval, below)
-    console.print(table)
+    print_table(table, console)
     if soundings is not None and normality is not None:
         _print_normality(soundings, component, normality)
 
@@ -296,7 +296,7 @@ def _print_normality(soundings: Path, component: str, folder: Path) -> None:
             f"{h:g}", f"{found.skewness[i]:+.2f}", f"{found.kurtosis[i]:+.2f}", f"{found.probability[i]:.2g}",
             f"{100 * found.beyond[i]:.1f} %", f"{found.tail_probability[i]:.2g}", f"{100 * found.far_beyond[i]:.2f} %",
         )  # fmt: skip
-    console.print(table)
+    print_table(table, console)
     job.written += write_figure(normality_figure(read, f"{read.source}, {read.period}"), folder, "normality")
     job.end()
 
@@ -378,7 +378,7 @@ def check(
     table.add_row("largest real part of a frozen pole", f"{v.largest_pole:.3g} 1/m")
     table.add_row("largest over smallest state", f"{v.state_ratio:.3g}")
     table.add_row(f"inside the 99 % band of {profiles} profiles", f"{100 * share:.1f} %")
-    console.print(table)
+    print_table(table, console)
 
 
 @wind.command()
@@ -473,4 +473,4 @@ def compare(
         change = (case.deviation / found[0].deviation) ** 2 - 1
         mean, sigma = (f"{factor * value:.4g}" for value in (case.mean, case.deviation))
         table.add_row(case.wind, mean, sigma, f"{100 * change:+.1f} %")
-    console.print(table)
+    print_table(table, console)

@@ -12,6 +12,7 @@ from rich.table import Table
 
 from ..present.files import write_text
 from ..present.style import display, words, write_figure
+from ..present.terminal import print_table
 from .design import DesignResult, RecomputedPeak, TradePoint
 from .trade_figure import trade_figure
 
@@ -23,7 +24,7 @@ def print_design(result: DesignResult, again: Sequence[RecomputedPeak], console:
         table.add_column(column, justify="right", no_wrap=True)
     for name, (low, high) in result.problem.parameters.items():
         table.add_row(name, f"{result.start[name]:.5g}", f"{result.values[name]:.5g}", f"{low:g} and {high:g}")
-    console.print(table)
+    print_table(table, console)
     table = Table("what", title="Peaks are of |mean| + 3σ, dampings the least at the frozen times")
     for column in ("before", "after", "limit"):
         table.add_column(column, justify="right", no_wrap=True)
@@ -38,7 +39,7 @@ def print_design(result: DesignResult, again: Sequence[RecomputedPeak], console:
             f"{factor * quantity.after:.4g}{unit}{at}",
             limit,
         )
-    console.print(table)
+    print_table(table, console)
     for name, multiplier in result.stationarity.multipliers:
         console.print(f"active: {name}, multiplier {multiplier:.3g}", soft_wrap=True, highlight=False)
     console.print(verdict(result, again), style="green" if good(result, again) else "bold red", soft_wrap=True)

@@ -13,6 +13,7 @@ from rich.table import Table
 from ..present.files import write_text
 from ..present.netcdf import write_netcdf
 from ..present.style import write_figure
+from ..present.terminal import print_table
 from .derivative_figures import altitude_figure, heading, largest, time_figure, tornado_figure
 from .layout import stored_layout
 
@@ -30,19 +31,19 @@ def print_sensitivity(found: xr.Dataset, console: Console) -> None:
         at = found.sel(parameter=name)
         number = f"{float(at['parameter_value']):.5g} {at['parameter_unit'].item()}".removesuffix(" 1")
         table.add_row(name, number, f"{size:+.4f}", f"{float(at['derivative']):+.4g}")
-    console.print(table)
+    print_table(table, console)
     if "table_elasticity" in found:
         table = Table("table", title="The same by whole tables, others held")
         table.add_column("% per %", justify="right")
         for name, size in largest(found["table"].values, found["table_elasticity"].values, SHOWN):
             table.add_row(name, f"{size:+.4f}")
-        console.print(table)
+        print_table(table, console)
     if found.sizes.get("grouped_factor"):
         table = Table("grouped factor", title="Tables that one cause moves together")
         table.add_column("% per %", justify="right")
         for name, size in zip(found["grouped_factor"].values, found["grouped_factor_elasticity"].values, strict=True):
             table.add_row(str(name), f"{float(size):+.4f}")
-        console.print(table)
+        print_table(table, console)
     if found.attrs["peak_at_end_of_range"]:
         console.print("The peak is an end of the range searched; the true one may lie beyond.", style="dim")
 

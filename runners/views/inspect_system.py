@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.table import Table
 
 from ...model.equations.report_symbols import report_symbol
+from ..present.terminal import print_table
 from ..study import Study
 
 
@@ -54,11 +55,11 @@ def print_inspection(found: dict[str, Any], console: Console) -> None:
     table = Table("table", "report symbol", "value", "unit", title="Table values")
     for row in found["tables"]:
         table.add_row(row["name"], row["symbol"], f"{row['value']:.6g}", row["unit"])
-    console.print(table)
+    print_table(table, console)
     table = Table("parameter", "value", "unit", title="Parameters")
     for row in found["parameters"]:
         table.add_row(row["name"], f"{row['value']:.6g}", row["unit"])
-    console.print(table)
+    print_table(table, console)
     states = [s["name"] for s in found["states"]]
     noises, outputs = [n["name"] for n in found["noises"]], [o["name"] for o in found["outputs"]]
     for name, rows, columns in (
@@ -72,7 +73,7 @@ def print_inspection(found: dict[str, Any], console: Console) -> None:
         for label, values in zip(rows, matrix, strict=True):
             entries = (f"{columns[j]}: {values[j]:.5g}" for j in np.flatnonzero(values))
             table.add_row(label, ",  ".join(entries) or "-")
-        console.print(table)
+        print_table(table, console)
     table = Table("root (rad/s)", "frequency (rad/s)", "(Hz)", "damping ratio", "states", title="Roots of A, frozen")
     for root in found["roots"]:
         sign = "±" if root["imaginary_rad_s"] else ""
@@ -87,4 +88,4 @@ def print_inspection(found: dict[str, Any], console: Console) -> None:
             f"{root['damping']:.4g}",
             ", ".join(root["states"]),
         )
-    console.print(table)
+    print_table(table, console)
