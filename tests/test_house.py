@@ -149,6 +149,18 @@ def test_files_of_tests_have_names_of_their_own():
     assert [name for name, count in names.items() if count > 1] == []
 
 
+def test_tests_take_what_they_share_by_its_bare_name():
+    """Beside an installed package `tests` is no importable name; pytest's own path holds tests/support."""
+    tests = Path(__file__).parent
+    wrong = [
+        f"{file.relative_to(tests)}:{node.lineno}"
+        for file in tests.rglob("*.py")
+        for node in ast.walk(ast.parse(file.read_text()))
+        if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "tests"
+    ]
+    assert wrong == []
+
+
 def test_rooms_say_what_they_are():
     unsaid = []
     for folder in {path.parent for path in MODULES.values()}:

@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from planes import EACH, HORIZONTAL, in_both, in_one
 
 from ascentwind.codegen.system.evaluation import MatrixEvaluator
 from ascentwind.model.tables import table_values
 from ascentwind.model.vehicle.planes import flown_planes
 from ascentwind.model.wind.two_components import TwoComponentWind, plane_weights
 from ascentwind.runners import Study
-from tests.support.planes import EACH, HORIZONTAL, in_both, in_one
 
 TIMES = (20.0, 75.0, 120.0)
 

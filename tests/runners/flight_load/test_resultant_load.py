@@ -7,13 +7,13 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 import pytest
+from lag import lag
 from scipy.special import j1, jn_zeros
 from scipy.stats import norm
 
 import ascentwind as aw
 from ascentwind.model import define_system
 from ascentwind.model.errors import ParameterValueError, PlanesError, UnknownNameError
-from tests.support.lag import lag
 
 END = 2.0
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from lag import lag
 
 import ascentwind as aw
 from ascentwind.model.errors import ParameterValueError, PlanesError, TimeRangeError, UnknownNameError
 from ascentwind.runners.station_loads.loads_along_vehicle import resultant_along_vehicle
-from tests.support.lag import lag
 
 MOMENTS = ("pitch_bending_moment", "yaw_bending_moment")
 NAMES = ("wind.azimuth", "control.T1.gain", "thrust.sigma", "wind.mean_scale", "wind.sigma_scale", "bending.1.damping")

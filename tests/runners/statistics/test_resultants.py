@@ -7,6 +7,8 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 import pytest
+from lag import lag
+from planes import EACH, HORIZONTAL, in_both, in_one
 from scipy.stats import ncx2
 
 import ascentwind as aw
@@ -15,8 +17,6 @@ from ascentwind.model.errors import ParameterValueError, PlanesError, UnknownNam
 from ascentwind.model.wind.two_components import TwoComponentFilter, TwoComponentWind
 from ascentwind.runners.statistics.norm import LIKE_3_SIGMA, NormOfNormal
 from ascentwind.runners.statistics.resultant_figures import direction_figure, history_figure
-from tests.support.lag import lag
-from tests.support.planes import EACH, HORIZONTAL, in_both, in_one
 
 TIMES = np.arange(40.0, 121.0, 20.0)
 MOMENTS = ["pitch_bending_moment", "yaw_bending_moment"]
