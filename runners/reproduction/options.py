@@ -17,6 +17,8 @@ from ..study import Study
 from .predictions import ATTACK, ENGINE, TIME, Responses, end_times, responses
 from .rebuild import rebuilt, third_mode
 
+GUST_ZONES = "options.gust_zones"
+
 
 @dataclass(frozen=True)
 class Option:
@@ -39,6 +41,10 @@ class Option:
 
 def _correlation(seconds: float) -> dict[str, float]:
     return {f"noise.{n}.correlation_time_s": seconds for n in ("thrust", "center_of_pressure")}
+
+
+def _turbulence(severity: str, changes: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    return {"wind.turbulence.severity": severity} | dict(changes or {})
 
 
 OPTIONS = (
@@ -71,6 +77,14 @@ OPTIONS = (
         {"noise.thrust.white": True, "noise.center_of_pressure.white": True},
     ),
     Option("closed_form_wind", "closed form of the wind filter, not the fitted one", {"wind.synthesis": "closed_form"}),
+    Option("gust_zones", "wind met nose first, in five zones", {GUST_ZONES: 5}),
+    Option(
+        "moderate_turbulence_at_once",
+        "moderate turbulence, which the whole vehicle meets at once",
+        _turbulence("moderate", {GUST_ZONES: 1}),
+    ),
+    Option("moderate_turbulence", "moderate turbulence, met nose first", _turbulence("moderate")),
+    Option("severe_turbulence", "severe turbulence, met nose first", _turbulence("severe")),
 )
 
 

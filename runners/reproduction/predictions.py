@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from ...model.errors import DataError
-from ...model.system.names import COMBINED
+from ...model.system.names import COMBINED, TURBULENCE, WIND
 from ...model.wind.range_reference import shipped_statistics
 from ..case.times import parse_times
 from ..solvers.stability import roots
@@ -42,8 +42,8 @@ class Responses:
     Attributes
     ----------
     peak_mean, sigma_75, peak : float
-        Largest size of the mean bending moment; its standard deviation at 75 s from wind alone; largest |mean| +
-        3 sigma (N m).
+        Largest size of the mean bending moment; its standard deviation at 75 s from wind alone, turbulence included;
+        largest |mean| + 3 sigma (N m).
     peak_time : float
         Of |mean| + 3 sigma (s).
     engine : float
@@ -83,7 +83,9 @@ def larger_sides(statistics: ResponseStatistics, source: str) -> xr.DataArray:
 
 def responses(statistics: ResponseStatistics) -> Responses:
     """Return the numbers of a full table of responses."""
-    both, wind = (larger_sides(statistics, source) for source in (COMBINED, "wind"))
+    sources = [name for name in (WIND, TURBULENCE) if name in statistics.variance["source"].values]
+    of_wind = np.sqrt(statistics.variance.sel(source=sources).sum("source"))
+    both, wind = larger_sides(statistics, COMBINED), larger_side(statistics.mean.sel(source=WIND), of_wind)
     at = {"response": ATTACK, "time": TIME}
 
     def rise(response: str) -> float:
@@ -91,8 +93,8 @@ def responses(statistics: ResponseStatistics) -> Responses:
 
     moment = both.sel(response=BENDING)
     return Responses(
-        peak_mean=float(abs(statistics["mean"].sel(response=BENDING, source="wind")).max()),
-        sigma_75=float(statistics["std"].sel(response=BENDING, source="wind", time=TIME)),
+        peak_mean=float(abs(statistics.mean.sel(response=BENDING, source=WIND)).max()),
+        sigma_75=float(of_wind.sel(response=BENDING, time=TIME)),
         peak=float(moment.max()),
         peak_time=float(moment["time"].values[int(np.argmax(moment.values))]),
         engine=float(both.sel(response=ENGINE).max()),

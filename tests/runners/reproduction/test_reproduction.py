@@ -17,7 +17,7 @@ from ascentwind.runners.reproduction.as506.flight import FlightCheck
 from ascentwind.runners.reproduction.calibration import Calibration, Input
 from ascentwind.runners.reproduction.directional import directional_derivative
 from ascentwind.runners.reproduction.mean_wind import MeanWind, WindRatio
-from ascentwind.runners.reproduction.options import Effect, Option
+from ascentwind.runners.reproduction.options import OPTIONS, Effect, Option, effect
 from ascentwind.runners.reproduction.page import Reproduction, page
 from ascentwind.runners.reproduction.predictions import Prediction, Responses, end_times, responses
 from ascentwind.runners.reproduction.published import BY_NAME
@@ -152,3 +152,22 @@ def test_page_in_the_docs_holds_the_present_numbers(as504):
     text = PAGE.read_text(encoding="utf-8")
     for value in (found.peak_mean, found.sigma_75, found.peak):
         assert f"| {value / 1e6:.2f} MN m |" in text
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["gust_zones", "moderate_turbulence_at_once", "moderate_turbulence"])
+def test_rows_of_gusts_and_turbulence_in_the_docs_hold_the_present_numbers(name, as504, tmp_path):
+    """Their sigma at 75 s is that of wind and turbulence together, whose variances add up."""
+    (option,) = (each for each in OPTIONS if each.name == name)
+    found = effect(AS504, option, tmp_path)
+    assert found.responses is not None
+    own = responses(as504.response_statistics(end_times(as504)))
+    row = next(line for line in PAGE.read_text(encoding="utf-8").splitlines() if line.startswith(f"| {option.what} |"))
+    changes = (getattr(found.responses, each) / getattr(own, each) - 1 for each in ("peak_mean", "sigma_75", "peak"))
+    assert row.split(" | ")[1:4] == [f"{100 * change:+.1f} %" for change in changes]
+    variance = Study.load("as504", changes=option.changes).response_statistics([75.0]).variance
+    at = {"response": "bending_moment", "time": 75.0}
+    parts = [float(variance.sel(source=source, **at)) for source in variance["source"].values if source != "combined"]
+    of_vehicle = sum(float(variance.sel(source=source, **at)) for source in ("thrust", "center_of_pressure"))
+    assert found.responses.sigma_75**2 == pytest.approx(sum(parts) - of_vehicle, rel=1e-9)
+    assert found.responses.rise_bending < own.rise_bending, "turbulence is not one of the vehicle's noises"
