@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from .covariance import Rate, compiled_rate, covariance_derivative
 from .executable import ExecutableSystem
-from .functions import MATRICES
+from .functions import MATRICES, state_scales
 
 
 class MatrixEvaluator:
@@ -48,3 +49,24 @@ class MatrixEvaluator:
             matrix[places] = nonzeros
             found.append(matrix.reshape(rows, columns))
         return found
+
+
+def covariance_rate(executable: ExecutableSystem) -> Rate:
+    """Return (time, low, high, y) -> dy/dt of the covariance equation; it serves one thread.
+
+    In C where the system is compiled, by NumPy elsewhere.
+    """
+    system, scale = executable.system, state_scales(executable.system)
+    if executable.shared_library is not None:
+        n = scale.size
+        size = len(system.sources) * n * (n + 1) // 2 + n
+        return compiled_rate(executable.shared_library, executable.parameters, executable.tables, size)
+    noises = [system.noise_columns(source) for source in system.sources]
+    matrices = MatrixEvaluator(executable, ("A", "B", "E", "inputs"))
+
+    def rate(time: float, low: float, high: float, y: NDArray) -> NDArray:
+        A, B, E, inputs = matrices(time, low, high)
+        known = (E @ inputs[:, 0]) / scale
+        return covariance_derivative(A * scale / scale[:, None], B / scale[:, None], known, noises, y)
+
+    return rate

@@ -14,7 +14,15 @@ from ...model.system.linear_system import LinearSystem
 from ...model.system.time_conditions import Stops
 from ...model.tables import TableGroup, run_time_vector, table_values
 from ..toolchain.library import Libraries, Library, Recipe
-from .functions import MATRICES, CoreFunctions, SystemFunctions, core_functions, interpreted_functions
+from .covariance import compiled_rate, covariance_derivative
+from .functions import (
+    MATRICES,
+    CoreFunctions,
+    SystemFunctions,
+    core_functions,
+    interpreted_functions,
+    state_scales,
+)
 from .source import c_source, source_fingerprint
 
 AGREEMENT = 1e-12  # between compiled and interpreted functions, of the largest entry
@@ -170,6 +178,8 @@ def difference_from_core(executable: ExecutableSystem, points: int = 2, seed: in
             (backward[2], core.adjoint_quadrature(time, v, p, adjoint)),
             (forward[0], core.mean(time, v, p, x)),
         ]
+        if executable.shared_library is not None:
+            pairs.append(_covariance_rates(executable, executable.shared_library, time, v, random))
         for ours, reference in pairs:
             a, b = ca.DM(ours).full(), ca.DM(reference).full()
             differ = ~((a == b) | (np.isnan(a) & np.isnan(b)))
@@ -178,3 +188,16 @@ def difference_from_core(executable: ExecutableSystem, points: int = 2, seed: in
                 difference = float(np.abs(a[differ] - b[differ]).max()) / scale
                 largest = difference if not difference <= largest else largest
     return largest
+
+
+def _covariance_rates(
+    executable: ExecutableSystem, library: Library, time: float, v: NDArray, random: np.random.Generator
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the right-hand side of the covariance equation at a random y by compiled code, and by NumPy."""
+    system, core, p, scale = executable.system, executable.core, executable.parameters, state_scales(executable.system)
+    noises = [system.noise_columns(source) for source in system.sources]
+    y = random.standard_normal(len(noises) * scale.size * (scale.size + 1) // 2 + scale.size)
+    ours = compiled_rate(library, p, executable.tables, y.size)(time, time, time, y)
+    A = core.state_matrix(time, v, p).full() * scale / scale[:, None]
+    B, known = (part.full() / scale[:, None] for part in core.covariance_inputs(time, v, p))
+    return ours, covariance_derivative(A, B, known[:, 0], noises, y)

@@ -70,6 +70,8 @@ class CoreFunctions:
         (t, v, p, x) -> integrands of the quadratures, per second of flight.
     response : Function
         (t, v, p, x) -> outputs without noise.
+    covariance_inputs : Function
+        (t, v, p) -> B, sparse, and E u, dense: what drives the covariance equation and the mean beside it.
     """
 
     state_matrix: ca.Function
@@ -78,6 +80,7 @@ class CoreFunctions:
     adjoint_quadrature: ca.Function
     mean: ca.Function
     response: ca.Function
+    covariance_inputs: ca.Function
 
 
 def core_functions(system: LinearSystem) -> CoreFunctions:
@@ -93,7 +96,12 @@ def core_functions(system: LinearSystem) -> CoreFunctions:
         adjoint_quadrature=ca.Function("adjoint_quadrature_core", [*at, adjoint], [quadrature]),
         mean=ca.Function("mean_core", [*at, state], [mean_rate]),
         response=ca.Function("response_core", [*at, system.x], [ca.densify(_without_noise(system, system.output))]),
+        covariance_inputs=ca.Function("covariance_inputs_core", at, [system.B, ca.densify(_known(system))]),
     )
+
+
+def _known(system: LinearSystem) -> ca.SX:
+    return system.E @ system.input_values if system.u.numel() else ca.SX.zeros(len(system.states))
 
 
 def state_scales(system: LinearSystem) -> np.ndarray:

@@ -119,7 +119,9 @@ def c_source(system: LinearSystem, core: CoreFunctions) -> str:
                 c_function(f.name(), f, ("t", "v", "p", "x"), ("result",), names)
                 for f in (core.adjoint, core.adjoint_quadrature, core.mean, core.response)
             ),
+            c_function("covariance_inputs_core", core.covariance_inputs, ("t", "v", "p"), ("B", "known"), names),
         ],
+        covariance=_covariance(system, core),
         patterns=patterns.labels,
         integrands=integrands,
         exported=exported,
@@ -158,6 +160,23 @@ def _integrand_interface(
         {"name": name, "inputs": inputs, "outputs": outputs},
         {"name": f"jac_{name}", "inputs": inputs + unused, "outputs": blocks},
     ]
+
+
+def _covariance(system: LinearSystem, core: CoreFunctions) -> dict[str, list]:
+    """Return patterns and scales of the covariance equation, and the noises, one source after another."""
+    A, B = core.state_matrix.sparsity_out(0), core.covariance_inputs.sparsity_out(0)
+    _, _, factors = _jacobian(A, state_scales(system), transposed=False)
+    noises = [system.noise_columns(source) for source in system.sources]
+    return {
+        "rows": A.row(),
+        "columns": A.get_col(),
+        "factors": factors,
+        "moved": B.row(),
+        "first": B.colind(),
+        "scales": [repr(float(scale)) for scale in state_scales(system)],
+        "noises_of": [len(own) for own in noises],
+        "noise": [column for own in noises for column in own],
+    }
 
 
 def _jacobian(A: ca.Sparsity, scale: np.ndarray, transposed: bool) -> tuple[ca.Sparsity, list[int], list[str]]:

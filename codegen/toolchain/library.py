@@ -56,6 +56,15 @@ class Library(CompiledLibrary):
         given, code = [_c_argument(a) for a in arguments], getattr(self._handle, function)
         return interruptible(lambda flag: code(*given, _c_argument(flag)))
 
+    def bound(self, function: str, *arguments: object) -> Callable[[], None]:
+        """Return a short function with its arguments, to be called many times as their arrays change."""
+        given, code = [_c_argument(a) for a in arguments], getattr(self._handle, function)
+
+        def call() -> None:
+            code(*given)
+
+        return call
+
     def call_to_the_end(self, function: str, *arguments: object) -> None:
         """Call a short function, which looks at no flag and returns nothing."""
         getattr(self._handle, function)(*map(_c_argument, arguments))

@@ -7,6 +7,7 @@
  *   response(t, low, high, p, address, x) -> C x + G u
  *   adjoint, mean (t, x, z, p, u) -> ode, alg, quad, zero                 integrands in the manner of CasADi
  *   jac_adjoint, jac_mean                                                 d ode / d x, sparse
+ *   covariance_rate(at, p, tables, y) -> rate                             the covariance equation, scaled
  *
  * The vector p of an integrand: origin, span, low, high, 42 parameters, address of the tables.
  * Flight time is origin - span t for the adjoint and origin + span t for the mean, kept within [low, high].
@@ -8063,6 +8064,167 @@ static void response_core(const double *t, const double *v, const double *p, con
   result[7] = a578;
 }
 
+static void covariance_inputs_core(const double *t, const double *v, const double *p, double *restrict B, double *restrict known) {
+  (void)t;
+  const double a0 = sqrt(v[V_altitude_rate]);
+  const double a1 = a0 * v[V_wind_filter_G_3_1];
+  B[0] = a1;
+  const double a2 = a0 * v[V_wind_filter_G_1_2];
+  B[1] = a2;
+  const double a3 = a0 * v[V_wind_filter_G_2_2];
+  B[2] = a3;
+  const double a4 = 2.0 / p[P_thrust_correlation_time];
+  const double a5 = sqrt(a4);
+  B[3] = a5;
+  const double a6 = 2.0 / p[P_center_of_pressure_correlation_time];
+  const double a7 = sqrt(a6);
+  B[4] = a7;
+  const double a8 = v[V_dynamic_pressure] * p[P_reference_area];
+  const double a9 = a8 * v[V_normal_force_slope];
+  const double a10 = a9 / v[V_relative_velocity];
+  const double a11 = a10 / v[V_mass];
+  const double a12 = p[P_wind_mean_scale] * v[V_wind_mean];
+  const double a13 = a11 * a12;
+  known[0] = a13;
+  known[1] = 0.0;
+  const double a14 = v[V_dynamic_pressure] * p[P_reference_area];
+  const double a15 = a14 * v[V_normal_force_slope];
+  const double a16 = v[V_center_of_pressure] - v[V_center_of_gravity];
+  const double a17 = a15 * a16;
+  const double a18 = a17 / v[V_relative_velocity];
+  const double a19 = a18 / v[V_moment_of_inertia];
+  const double a20 = a19 * a12;
+  known[2] = a20;
+  known[3] = 0.0;
+  known[4] = 0.0;
+  known[5] = 0.0;
+  known[6] = 0.0;
+  known[7] = 0.0;
+  known[8] = 0.0;
+  known[9] = 0.0;
+  known[10] = 0.0;
+  known[11] = 0.0;
+  known[12] = 0.0;
+  known[13] = 0.0;
+  known[14] = 0.0;
+  known[15] = 0.0;
+  const double a21 = v[V_dynamic_pressure] * p[P_reference_area];
+  const double a22 = a21 * v[V_bending_1_normal_force_slope_times_displacement];
+  const double a23 = a22 / v[V_relative_velocity];
+  const double a24 = v[V_bending_1_displacement_at_sic_lox] * v[V_slosh_sic_lox_mass];
+  const double a25 = v[V_slosh_sic_lox_attach_point] - v[V_center_of_gravity];
+  const double a26 = a25 * a19;
+  const double a27 = a11 + a26;
+  const double a28 = a24 * a27;
+  const double a29 = v[V_bending_1_displacement_at_sic_rp1] * v[V_slosh_sic_rp1_mass];
+  const double a30 = v[V_slosh_sic_rp1_attach_point] - v[V_center_of_gravity];
+  const double a31 = a30 * a19;
+  const double a32 = a11 + a31;
+  const double a33 = a29 * a32;
+  const double a34 = a28 + a33;
+  const double a35 = v[V_bending_1_displacement_at_sii_lox] * v[V_slosh_sii_lox_mass];
+  const double a36 = v[V_slosh_sii_lox_attach_point] - v[V_center_of_gravity];
+  const double a37 = a36 * a19;
+  const double a38 = a11 + a37;
+  const double a39 = a35 * a38;
+  const double a40 = a34 + a39;
+  const double a41 = v[V_bending_1_displacement_at_sivb_lox] * v[V_slosh_sivb_lox_mass];
+  const double a42 = v[V_slosh_sivb_lox_attach_point] - v[V_center_of_gravity];
+  const double a43 = a42 * a19;
+  const double a44 = a11 + a43;
+  const double a45 = a41 * a44;
+  const double a46 = a40 + a45;
+  const double a47 = a23 + a46;
+  const double a48 = a24 * v[V_bending_1_displacement_at_sic_lox];
+  const double a49 = a29 * v[V_bending_1_displacement_at_sic_rp1];
+  const double a50 = a48 + a49;
+  const double a51 = a35 * v[V_bending_1_displacement_at_sii_lox];
+  const double a52 = a50 + a51;
+  const double a53 = a41 * v[V_bending_1_displacement_at_sivb_lox];
+  const double a54 = a52 + a53;
+  const double a55 = v[V_bending_1_generalized_mass] - a54;
+  const double a56 = a47 / a55;
+  const double a57 = v[V_bending_2_displacement_at_sic_lox] * v[V_slosh_sic_lox_mass];
+  const double a58 = a57 * v[V_bending_1_displacement_at_sic_lox];
+  const double a59 = v[V_bending_2_displacement_at_sic_rp1] * v[V_slosh_sic_rp1_mass];
+  const double a60 = a59 * v[V_bending_1_displacement_at_sic_rp1];
+  const double a61 = a58 + a60;
+  const double a62 = v[V_bending_2_displacement_at_sii_lox] * v[V_slosh_sii_lox_mass];
+  const double a63 = a62 * v[V_bending_1_displacement_at_sii_lox];
+  const double a64 = a61 + a63;
+  const double a65 = v[V_bending_2_displacement_at_sivb_lox] * v[V_slosh_sivb_lox_mass];
+  const double a66 = a65 * v[V_bending_1_displacement_at_sivb_lox];
+  const double a67 = a64 + a66;
+  const double a68 = a67 / a55;
+  const double a69 = a21 * v[V_bending_2_normal_force_slope_times_displacement];
+  const double a70 = a69 / v[V_relative_velocity];
+  const double a71 = a57 * a27;
+  const double a72 = a59 * a32;
+  const double a73 = a71 + a72;
+  const double a74 = a62 * a38;
+  const double a75 = a73 + a74;
+  const double a76 = a65 * a44;
+  const double a77 = a75 + a76;
+  const double a78 = a70 + a77;
+  const double a79 = a68 * a47;
+  const double a80 = a78 + a79;
+  const double a81 = a57 * v[V_bending_2_displacement_at_sic_lox];
+  const double a82 = a59 * v[V_bending_2_displacement_at_sic_rp1];
+  const double a83 = a81 + a82;
+  const double a84 = a62 * v[V_bending_2_displacement_at_sii_lox];
+  const double a85 = a83 + a84;
+  const double a86 = a65 * v[V_bending_2_displacement_at_sivb_lox];
+  const double a87 = a85 + a86;
+  const double a88 = v[V_bending_2_generalized_mass] - a87;
+  const double a89 = a68 * a68;
+  const double a90 = a89 * a55;
+  const double a91 = a88 - a90;
+  const double a92 = a80 / a91;
+  const double a93 = a68 * a92;
+  const double a94 = a56 + a93;
+  const double a95 = a94 * a12;
+  known[16] = a95;
+  const double a96 = a92 * a12;
+  known[17] = a96;
+  known[18] = 0.0;
+  known[19] = 0.0;
+  known[20] = 0.0;
+  known[21] = 0.0;
+  const double a97 = v[V_bending_1_displacement_at_sic_lox] * a94;
+  const double a98 = v[V_bending_2_displacement_at_sic_lox] * a92;
+  const double a99 = a97 + a98;
+  const double a100 = a27 + a99;
+  const double a101 = a100 * a12;
+  const double a102 = -a101;
+  known[22] = a102;
+  const double a103 = v[V_bending_1_displacement_at_sic_rp1] * a94;
+  const double a104 = v[V_bending_2_displacement_at_sic_rp1] * a92;
+  const double a105 = a103 + a104;
+  const double a106 = a32 + a105;
+  const double a107 = a106 * a12;
+  const double a108 = -a107;
+  known[23] = a108;
+  const double a109 = v[V_bending_1_displacement_at_sii_lox] * a94;
+  const double a110 = v[V_bending_2_displacement_at_sii_lox] * a92;
+  const double a111 = a109 + a110;
+  const double a112 = a38 + a111;
+  const double a113 = a112 * a12;
+  const double a114 = -a113;
+  known[24] = a114;
+  const double a115 = v[V_bending_1_displacement_at_sivb_lox] * a94;
+  const double a116 = v[V_bending_2_displacement_at_sivb_lox] * a92;
+  const double a117 = a115 + a116;
+  const double a118 = a44 + a117;
+  const double a119 = a118 * a12;
+  const double a120 = -a119;
+  known[25] = a120;
+  known[26] = 0.0;
+  known[27] = 0.0;
+  known[28] = 0.0;
+  known[29] = 0.0;
+  known[30] = 0.0;
+}
+
 /* ---- Interface ---- */
 
 
@@ -8174,6 +8336,48 @@ EXPORT int jac_mean(const double **arg, double **res, casadi_int *iw, double *w,
   for (block = 0; block < 1; ++block)
     for (i = 0; i < 189; ++i) res[1][block * 189 + i] = span * factor[i] * A[entry[i]];
   return 0;
+}
+
+/* The covariance equation P' = A P + P A' + B_s B_s' of every source s, and x' = A x + E u, in states by their scales.
+ * y and rate: the lower triangle of each P, row by row, then x; at: flight time and the interval it is kept within. */
+enum { STATES = 31, WIDTH = 32, SOURCES = 3 };
+
+EXPORT void covariance_rate(const double *at, const double *p, const double *tables, const double *y, double *rate) {
+  static const int row[] = {0, 2, 16, 17, 22, 23, 24, 25, 0, 2, 6, 16, 17, 22, 23, 24, 25, 1, 11, 6, 13, 3, 6, 13, 4, 6, 13, 5, 6, 13, 11, 13, 7, 11, 13, 8, 11, 13, 9, 11, 13, 10, 11, 13, 0, 2, 13, 16, 17, 22, 23, 24, 25, 12, 13, 0, 2, 6, 16, 17, 22, 23, 24, 25, 0, 2, 6, 16, 17, 22, 23, 24, 25, 11, 14, 16, 17, 22, 23, 24, 25, 11, 15, 16, 17, 22, 23, 24, 25, 16, 17, 22, 23, 24, 25, 16, 17, 22, 23, 24, 25, 16, 17, 22, 23, 24, 25, 16, 17, 22, 23, 24, 25, 16, 17, 18, 22, 23, 24, 25, 16, 17, 19, 22, 23, 24, 25, 16, 17, 20, 22, 23, 24, 25, 16, 17, 21, 22, 23, 24, 25, 0, 2, 16, 17, 22, 23, 24, 25, 26, 27, 0, 2, 16, 17, 22, 23, 24, 25, 26, 27, 28, 0, 2, 16, 17, 22, 23, 24, 25, 27, 28, 0, 2, 16, 17, 22, 23, 24, 25, 29, 2, 16, 17, 22, 23, 24, 25, 30}, column[] = {0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 2, 2, 3, 3, 4, 4, 4, 5, 5, 5, 6, 6, 6, 7, 7, 8, 8, 8, 9, 9, 9, 10, 10, 10, 11, 11, 11, 12, 12, 12, 12, 12, 12, 12, 12, 12, 13, 13, 14, 14, 14, 14, 14, 14, 14, 14, 14, 15, 15, 15, 15, 15, 15, 15, 15, 15, 16, 16, 16, 16, 16, 16, 16, 16, 17, 17, 17, 17, 17, 17, 17, 17, 18, 18, 18, 18, 18, 18, 19, 19, 19, 19, 19, 19, 20, 20, 20, 20, 20, 20, 21, 21, 21, 21, 21, 21, 22, 22, 22, 22, 22, 22, 22, 23, 23, 23, 23, 23, 23, 23, 24, 24, 24, 24, 24, 24, 24, 25, 25, 25, 25, 25, 25, 25, 26, 26, 26, 26, 26, 26, 26, 26, 26, 26, 27, 27, 27, 27, 27, 27, 27, 27, 27, 27, 27, 28, 28, 28, 28, 28, 28, 28, 28, 28, 28, 29, 29, 29, 29, 29, 29, 29, 29, 29, 30, 30, 30, 30, 30, 30, 30, 30};
+  static const double factor[] = {1.0, 500.0, 20.0, 20.0, 10.0, 10.0, 10.0, 10.0, 0.002, 1.0, 1.0, 0.04, 0.04, 0.02, 0.02, 0.02, 0.02, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.002, 1.0, 1.0, 0.04, 0.04, 0.02, 0.02, 0.02, 0.02, 1.0, 1.0, 0.01, 5.0, 5.0, 0.2, 0.2, 0.1, 0.1, 0.1, 0.1, 0.01, 5.0, 5.0, 0.2, 0.2, 0.1, 0.1, 0.1, 0.1, 25.0, 5.0, 1.0, 1.0, 0.5, 0.5, 0.5, 0.5, 25.0, 5.0, 1.0, 1.0, 0.5, 0.5, 0.5, 0.5, 1.0, 1.0, 0.5, 0.5, 0.5, 0.5, 1.0, 1.0, 0.5, 0.5, 0.5, 0.5, 1.0, 1.0, 0.5, 0.5, 0.5, 0.5, 1.0, 1.0, 0.5, 0.5, 0.5, 0.5, 2.0, 2.0, 2.0, 1.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 1.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 1.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 1.0, 1.0, 1.0, 1.0, 0.1, 50.0, 2.0, 2.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.1, 50.0, 2.0, 2.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.1, 50.0, 2.0, 2.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.1, 50.0, 2.0, 2.0, 1.0, 1.0, 1.0, 1.0, 1.0, 50.0, 2.0, 2.0, 1.0, 1.0, 1.0, 1.0, 1.0};
+  static const int moved[] = {28, 26, 27, 29, 30};  /* states of the nonzeros of B, column by column */
+  static const int first[] = {0, 1, 3, 4, 5};       /* of each column of B */
+  static const double scale[] = {10.0, 0.02, 0.02, 0.02, 0.02, 0.02, 0.02, 0.02, 0.02, 0.02, 0.02, 0.02, 0.02, 0.02, 0.1, 0.1, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0};
+  static const int noises_of[] = {2, 1, 1}; /* numbers of each source's noises, */
+  static const int noise[] = {0, 1, 2, 3};              /* one source after another */
+  const double t = clamp(at[0], at[1], at[2]);
+  double v[TABLE_VALUES + 1], A[189 + 1], B[5 + 1], known[STATES + 1];
+  double P[STATES + 1][WIDTH] = { { 0.0 } }, half[STATES + 1][WIDTH];
+  const int *own = noise;
+  int i, j, k, s;
+  lookup(t, (double)(uintptr_t)tables, v);
+  state_matrix_core(&t, v, p, A);
+  covariance_inputs_core(&t, v, p, B, known);
+  for (k = 0; k < 189; ++k) A[k] *= factor[k];
+  for (k = 0; k < 5; ++k) B[k] /= scale[moved[k]];
+  for (s = 0; s < SOURCES; ++s) {
+    for (i = 0; i < STATES; ++i)
+      for (j = 0; j <= i; ++j) P[i][j] = P[j][i] = *y++;
+    for (i = 0; i < STATES; ++i)
+      for (j = 0; j < WIDTH; ++j) half[i][j] = 0.0;
+    for (k = 0; k < 189; ++k) {
+      const double a = A[k], *of = P[column[k]];
+      double *into = half[row[k]];
+      for (j = 0; j < WIDTH; ++j) into[j] += a * of[j];
+    }
+    for (i = 0; i < noises_of[s]; ++i, ++own)
+      for (j = first[*own]; j < first[*own + 1]; ++j)
+        for (k = first[*own]; k < first[*own + 1]; ++k) half[moved[j]][moved[k]] += 0.5 * B[j] * B[k];
+    for (i = 0; i < STATES; ++i)
+      for (j = 0; j <= i; ++j) *rate++ = half[i][j] + half[j][i];
+  }
+  for (i = 0; i < STATES; ++i) rate[i] = known[i] / scale[i];
+  for (k = 0; k < 189; ++k) rate[row[k]] += A[k] * y[column[k]];
 }
 
 EXPORT casadi_int matrices_n_in(void) { return 5; }

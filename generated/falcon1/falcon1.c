@@ -7,6 +7,7 @@
  *   response(t, low, high, p, address, x) -> C x + G u
  *   adjoint, mean (t, x, z, p, u) -> ode, alg, quad, zero                 integrands in the manner of CasADi
  *   jac_adjoint, jac_mean                                                 d ode / d x, sparse
+ *   covariance_rate(at, p, tables, y) -> rate                             the covariance equation, scaled
  *
  * The vector p of an integrand: origin, span, low, high, 33 parameters, address of the tables.
  * Flight time is origin - span t for the adjoint and origin + span t for the mean, kept within [low, high].
@@ -13231,6 +13232,204 @@ static void response_core(const double *t, const double *v, const double *p, con
   result[12] = a809;
 }
 
+static void covariance_inputs_core(const double *t, const double *v, const double *p, double *restrict B, double *restrict known) {
+  (void)t;
+  const double a0 = sqrt(v[V_met_altitude_rate]);
+  const double a1 = a0 * v[V_wind_filter_G_3_1];
+  B[0] = a1;
+  const double a2 = a0 * v[V_wind_filter_G_1_2];
+  B[1] = a2;
+  const double a3 = a0 * v[V_wind_filter_G_2_2];
+  B[2] = a3;
+  const double a4 = v[V_met_altitude_rate] / p[P_turbulence_length];
+  const double a5 = sqrt(a4);
+  const double a6 = a5 + a5;
+  B[3] = a6;
+  const double a7 = 2.0 / p[P_thrust_correlation_time];
+  const double a8 = sqrt(a7);
+  B[4] = a8;
+  const double a9 = 2.0 / p[P_center_of_pressure_correlation_time];
+  const double a10 = sqrt(a9);
+  B[5] = a10;
+  const double a11 = v[V_dynamic_pressure] * p[P_reference_area];
+  const double a12 = a11 * v[V_normal_force_slope];
+  const double a13 = v[V_zones_normal_force_slope_1] + v[V_zones_normal_force_slope_2];
+  const double a14 = a13 + v[V_zones_normal_force_slope_3];
+  const double a15 = a14 + v[V_zones_normal_force_slope_4];
+  const double a16 = a15 + v[V_zones_normal_force_slope_5];
+  const double a17 = v[V_zones_normal_force_slope_1] / a16;
+  const double a18 = a17 / v[V_relative_velocity];
+  const double a19 = a12 * a18;
+  const double a20 = a19 / v[V_mass];
+  const double a21 = p[P_wind_mean_scale] * v[V_wind_mean];
+  const double a22 = a20 * a21;
+  known[0] = a22;
+  known[1] = 0.0;
+  const double a23 = v[V_dynamic_pressure] * p[P_reference_area];
+  const double a24 = a23 * v[V_normal_force_slope];
+  const double a25 = v[V_center_of_pressure] - v[V_center_of_gravity];
+  const double a26 = a24 * a25;
+  const double a27 = a26 * a18;
+  const double a28 = v[V_dynamic_pressure] * p[P_reference_area];
+  const double a29 = 1.0 - a17;
+  const double a30 = a29 / v[V_relative_velocity];
+  const double a31 = v[V_zones_first_moment_1] * a30;
+  const double a32 = a17 / v[V_relative_velocity];
+  const double a33 = v[V_zones_first_moment_2] * a32;
+  const double a34 = a31 - a33;
+  const double a35 = a17 / v[V_relative_velocity];
+  const double a36 = v[V_zones_first_moment_3] * a35;
+  const double a37 = a34 - a36;
+  const double a38 = a17 / v[V_relative_velocity];
+  const double a39 = v[V_zones_first_moment_4] * a38;
+  const double a40 = a37 - a39;
+  const double a41 = a17 / v[V_relative_velocity];
+  const double a42 = v[V_zones_first_moment_5] * a41;
+  const double a43 = a40 - a42;
+  const double a44 = a28 * a43;
+  const double a45 = a27 + a44;
+  const double a46 = a45 / v[V_moment_of_inertia];
+  const double a47 = a46 * a21;
+  known[2] = a47;
+  known[3] = 0.0;
+  known[4] = 0.0;
+  known[5] = 0.0;
+  known[6] = 0.0;
+  known[7] = 0.0;
+  known[8] = 0.0;
+  known[9] = 0.0;
+  known[10] = 0.0;
+  const double a48 = v[V_dynamic_pressure] * p[P_reference_area];
+  const double a49 = a48 * v[V_bending_1_normal_force_slope_times_displacement];
+  const double a50 = a49 * a18;
+  const double a51 = v[V_zones_displacement_1_1] * a30;
+  const double a52 = v[V_zones_displacement_1_2] * a32;
+  const double a53 = a51 - a52;
+  const double a54 = v[V_zones_displacement_1_3] * a35;
+  const double a55 = a53 - a54;
+  const double a56 = v[V_zones_displacement_1_4] * a38;
+  const double a57 = a55 - a56;
+  const double a58 = v[V_zones_displacement_1_5] * a41;
+  const double a59 = a57 - a58;
+  const double a60 = a28 * a59;
+  const double a61 = a50 + a60;
+  const double a62 = v[V_bending_1_displacement_at_s1_lox] * v[V_slosh_s1_lox_mass];
+  const double a63 = v[V_slosh_s1_lox_attach_point] - v[V_center_of_gravity];
+  const double a64 = a63 * a46;
+  const double a65 = a20 + a64;
+  const double a66 = a62 * a65;
+  const double a67 = v[V_bending_1_displacement_at_s1_rp1] * v[V_slosh_s1_rp1_mass];
+  const double a68 = v[V_slosh_s1_rp1_attach_point] - v[V_center_of_gravity];
+  const double a69 = a68 * a46;
+  const double a70 = a20 + a69;
+  const double a71 = a67 * a70;
+  const double a72 = a66 + a71;
+  const double a73 = v[V_bending_1_displacement_at_s2_lox] * v[V_slosh_s2_lox_mass];
+  const double a74 = v[V_slosh_s2_lox_attach_point] - v[V_center_of_gravity];
+  const double a75 = a74 * a46;
+  const double a76 = a20 + a75;
+  const double a77 = a73 * a76;
+  const double a78 = a72 + a77;
+  const double a79 = a61 + a78;
+  const double a80 = a62 * v[V_bending_1_displacement_at_s1_lox];
+  const double a81 = a67 * v[V_bending_1_displacement_at_s1_rp1];
+  const double a82 = a80 + a81;
+  const double a83 = a73 * v[V_bending_1_displacement_at_s2_lox];
+  const double a84 = a82 + a83;
+  const double a85 = v[V_bending_1_generalized_mass] - a84;
+  const double a86 = a79 / a85;
+  const double a87 = v[V_bending_2_displacement_at_s1_lox] * v[V_slosh_s1_lox_mass];
+  const double a88 = a87 * v[V_bending_1_displacement_at_s1_lox];
+  const double a89 = v[V_bending_2_displacement_at_s1_rp1] * v[V_slosh_s1_rp1_mass];
+  const double a90 = a89 * v[V_bending_1_displacement_at_s1_rp1];
+  const double a91 = a88 + a90;
+  const double a92 = v[V_bending_2_displacement_at_s2_lox] * v[V_slosh_s2_lox_mass];
+  const double a93 = a92 * v[V_bending_1_displacement_at_s2_lox];
+  const double a94 = a91 + a93;
+  const double a95 = a94 / a85;
+  const double a96 = a48 * v[V_bending_2_normal_force_slope_times_displacement];
+  const double a97 = a96 * a18;
+  const double a98 = v[V_zones_displacement_2_1] * a30;
+  const double a99 = v[V_zones_displacement_2_2] * a32;
+  const double a100 = a98 - a99;
+  const double a101 = v[V_zones_displacement_2_3] * a35;
+  const double a102 = a100 - a101;
+  const double a103 = v[V_zones_displacement_2_4] * a38;
+  const double a104 = a102 - a103;
+  const double a105 = v[V_zones_displacement_2_5] * a41;
+  const double a106 = a104 - a105;
+  const double a107 = a28 * a106;
+  const double a108 = a97 + a107;
+  const double a109 = a87 * a65;
+  const double a110 = a89 * a70;
+  const double a111 = a109 + a110;
+  const double a112 = a92 * a76;
+  const double a113 = a111 + a112;
+  const double a114 = a108 + a113;
+  const double a115 = a95 * a79;
+  const double a116 = a114 + a115;
+  const double a117 = a87 * v[V_bending_2_displacement_at_s1_lox];
+  const double a118 = a89 * v[V_bending_2_displacement_at_s1_rp1];
+  const double a119 = a117 + a118;
+  const double a120 = a92 * v[V_bending_2_displacement_at_s2_lox];
+  const double a121 = a119 + a120;
+  const double a122 = v[V_bending_2_generalized_mass] - a121;
+  const double a123 = a95 * a95;
+  const double a124 = a123 * a85;
+  const double a125 = a122 - a124;
+  const double a126 = a116 / a125;
+  const double a127 = a95 * a126;
+  const double a128 = a86 + a127;
+  const double a129 = a128 * a21;
+  known[11] = a129;
+  const double a130 = a126 * a21;
+  known[12] = a130;
+  known[13] = 0.0;
+  known[14] = 0.0;
+  known[15] = 0.0;
+  const double a131 = v[V_bending_1_displacement_at_s1_lox] * a128;
+  const double a132 = v[V_bending_2_displacement_at_s1_lox] * a126;
+  const double a133 = a131 + a132;
+  const double a134 = a65 + a133;
+  const double a135 = a134 * a21;
+  const double a136 = -a135;
+  known[16] = a136;
+  const double a137 = v[V_bending_1_displacement_at_s1_rp1] * a128;
+  const double a138 = v[V_bending_2_displacement_at_s1_rp1] * a126;
+  const double a139 = a137 + a138;
+  const double a140 = a70 + a139;
+  const double a141 = a140 * a21;
+  const double a142 = -a141;
+  known[17] = a142;
+  const double a143 = v[V_bending_1_displacement_at_s2_lox] * a128;
+  const double a144 = v[V_bending_2_displacement_at_s2_lox] * a126;
+  const double a145 = a143 + a144;
+  const double a146 = a76 + a145;
+  const double a147 = a146 * a21;
+  const double a148 = -a147;
+  known[18] = a148;
+  const double a149 = (-2.0) * v[V_zones_rate_1];
+  const double a150 = a149 * a21;
+  known[19] = a150;
+  const double a151 = 6.0 * v[V_zones_rate_1];
+  const double a152 = a151 * a21;
+  known[20] = a152;
+  known[21] = 0.0;
+  known[22] = 0.0;
+  known[23] = 0.0;
+  known[24] = 0.0;
+  known[25] = 0.0;
+  known[26] = 0.0;
+  known[27] = 0.0;
+  known[28] = 0.0;
+  known[29] = 0.0;
+  known[30] = 0.0;
+  known[31] = 0.0;
+  known[32] = 0.0;
+  known[33] = 0.0;
+  known[34] = 0.0;
+}
+
 /* ---- Interface ---- */
 
 
@@ -13342,6 +13541,48 @@ EXPORT int jac_mean(const double **arg, double **res, casadi_int *iw, double *w,
   for (block = 0; block < 1; ++block)
     for (i = 0; i < 226; ++i) res[1][block * 226 + i] = span * factor[i] * A[entry[i]];
   return 0;
+}
+
+/* The covariance equation P' = A P + P A' + B_s B_s' of every source s, and x' = A x + E u, in states by their scales.
+ * y and rate: the lower triangle of each P, row by row, then x; at: flight time and the interval it is kept within. */
+enum { STATES = 35, WIDTH = 40, SOURCES = 4 };
+
+EXPORT void covariance_rate(const double *at, const double *p, const double *tables, const double *y, double *rate) {
+  static const int row[] = {0, 2, 11, 12, 16, 17, 18, 0, 2, 4, 11, 12, 16, 17, 18, 1, 6, 4, 8, 3, 4, 6, 8, 5, 6, 0, 2, 8, 11, 12, 16, 17, 18, 7, 8, 0, 2, 4, 11, 12, 16, 17, 18, 0, 2, 4, 11, 12, 16, 17, 18, 6, 9, 11, 12, 16, 17, 18, 6, 10, 11, 12, 16, 17, 18, 11, 12, 16, 17, 18, 11, 12, 16, 17, 18, 11, 12, 16, 17, 18, 11, 12, 13, 16, 17, 18, 11, 12, 14, 16, 17, 18, 11, 12, 15, 16, 17, 18, 0, 2, 11, 12, 16, 17, 18, 19, 20, 21, 22, 19, 0, 2, 11, 12, 16, 17, 18, 21, 22, 23, 24, 21, 0, 2, 11, 12, 16, 17, 18, 23, 24, 25, 26, 23, 0, 2, 11, 12, 16, 17, 18, 25, 26, 25, 0, 2, 11, 12, 16, 17, 18, 19, 20, 27, 28, 0, 2, 11, 12, 16, 17, 18, 19, 20, 27, 28, 29, 0, 2, 11, 12, 16, 17, 18, 19, 20, 28, 29, 0, 2, 11, 12, 16, 17, 18, 19, 20, 31, 32, 0, 2, 11, 12, 16, 17, 18, 19, 20, 30, 31, 32, 0, 2, 11, 12, 16, 17, 18, 19, 20, 32, 0, 2, 11, 12, 16, 17, 18, 33, 2, 11, 12, 16, 17, 18, 34}, column[] = {0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5, 6, 6, 7, 7, 7, 7, 7, 7, 7, 7, 8, 8, 9, 9, 9, 9, 9, 9, 9, 9, 10, 10, 10, 10, 10, 10, 10, 10, 11, 11, 11, 11, 11, 11, 11, 12, 12, 12, 12, 12, 12, 12, 13, 13, 13, 13, 13, 14, 14, 14, 14, 14, 15, 15, 15, 15, 15, 16, 16, 16, 16, 16, 16, 17, 17, 17, 17, 17, 17, 18, 18, 18, 18, 18, 18, 19, 19, 19, 19, 19, 19, 19, 19, 19, 19, 19, 20, 21, 21, 21, 21, 21, 21, 21, 21, 21, 21, 21, 22, 23, 23, 23, 23, 23, 23, 23, 23, 23, 23, 23, 24, 25, 25, 25, 25, 25, 25, 25, 25, 25, 26, 27, 27, 27, 27, 27, 27, 27, 27, 27, 27, 27, 28, 28, 28, 28, 28, 28, 28, 28, 28, 28, 28, 28, 29, 29, 29, 29, 29, 29, 29, 29, 29, 29, 29, 30, 30, 30, 30, 30, 30, 30, 30, 30, 30, 30, 31, 31, 31, 31, 31, 31, 31, 31, 31, 31, 31, 31, 32, 32, 32, 32, 32, 32, 32, 32, 32, 32, 33, 33, 33, 33, 33, 33, 33, 33, 34, 34, 34, 34, 34, 34, 34};
+  static const double factor[] = {1.0, 500.0, 20.0, 20.0, 10.0, 10.0, 10.0, 0.002, 1.0, 1.0, 0.04, 0.04, 0.02, 0.02, 0.02, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.002, 1.0, 1.0, 0.04, 0.04, 0.02, 0.02, 0.02, 1.0, 1.0, 0.01, 5.0, 5.0, 0.2, 0.2, 0.1, 0.1, 0.1, 0.01, 5.0, 5.0, 0.2, 0.2, 0.1, 0.1, 0.1, 25.0, 5.0, 1.0, 1.0, 0.5, 0.5, 0.5, 25.0, 5.0, 1.0, 1.0, 0.5, 0.5, 0.5, 1.0, 1.0, 0.5, 0.5, 0.5, 1.0, 1.0, 0.5, 0.5, 0.5, 1.0, 1.0, 0.5, 0.5, 0.5, 2.0, 2.0, 2.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 1.0, 1.0, 1.0, 1.0, 500.0, 20.0, 20.0, 10.0, 10.0, 10.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 500.0, 20.0, 20.0, 10.0, 10.0, 10.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 500.0, 20.0, 20.0, 10.0, 10.0, 10.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 500.0, 20.0, 20.0, 10.0, 10.0, 10.0, 1.0, 1.0, 1.0, 0.1, 50.0, 2.0, 2.0, 1.0, 1.0, 1.0, 0.1, 0.1, 1.0, 1.0, 0.1, 50.0, 2.0, 2.0, 1.0, 1.0, 1.0, 0.1, 0.1, 1.0, 1.0, 1.0, 0.1, 50.0, 2.0, 2.0, 1.0, 1.0, 1.0, 0.1, 0.1, 1.0, 1.0, 0.1, 50.0, 2.0, 2.0, 1.0, 1.0, 1.0, 0.1, 0.1, 1.0, 1.0, 0.1, 50.0, 2.0, 2.0, 1.0, 1.0, 1.0, 0.1, 0.1, 1.0, 1.0, 1.0, 0.1, 50.0, 2.0, 2.0, 1.0, 1.0, 1.0, 0.1, 0.1, 1.0, 0.1, 50.0, 2.0, 2.0, 1.0, 1.0, 1.0, 1.0, 50.0, 2.0, 2.0, 1.0, 1.0, 1.0, 1.0};
+  static const int moved[] = {29, 27, 28, 31, 33, 34};  /* states of the nonzeros of B, column by column */
+  static const int first[] = {0, 1, 3, 4, 5, 6};       /* of each column of B */
+  static const double scale[] = {10.0, 0.02, 0.02, 0.02, 0.02, 0.02, 0.02, 0.02, 0.02, 0.1, 0.1, 0.5, 0.5, 0.5, 0.5, 0.5, 1.0, 1.0, 1.0, 10.0, 10.0, 10.0, 10.0, 10.0, 10.0, 10.0, 10.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0};
+  static const int noises_of[] = {2, 1, 1, 1}; /* numbers of each source's noises, */
+  static const int noise[] = {0, 1, 2, 3, 4};              /* one source after another */
+  const double t = clamp(at[0], at[1], at[2]);
+  double v[TABLE_VALUES + 1], A[226 + 1], B[6 + 1], known[STATES + 1];
+  double P[STATES + 1][WIDTH] = { { 0.0 } }, half[STATES + 1][WIDTH];
+  const int *own = noise;
+  int i, j, k, s;
+  lookup(t, (double)(uintptr_t)tables, v);
+  state_matrix_core(&t, v, p, A);
+  covariance_inputs_core(&t, v, p, B, known);
+  for (k = 0; k < 226; ++k) A[k] *= factor[k];
+  for (k = 0; k < 6; ++k) B[k] /= scale[moved[k]];
+  for (s = 0; s < SOURCES; ++s) {
+    for (i = 0; i < STATES; ++i)
+      for (j = 0; j <= i; ++j) P[i][j] = P[j][i] = *y++;
+    for (i = 0; i < STATES; ++i)
+      for (j = 0; j < WIDTH; ++j) half[i][j] = 0.0;
+    for (k = 0; k < 226; ++k) {
+      const double a = A[k], *of = P[column[k]];
+      double *into = half[row[k]];
+      for (j = 0; j < WIDTH; ++j) into[j] += a * of[j];
+    }
+    for (i = 0; i < noises_of[s]; ++i, ++own)
+      for (j = first[*own]; j < first[*own + 1]; ++j)
+        for (k = first[*own]; k < first[*own + 1]; ++k) half[moved[j]][moved[k]] += 0.5 * B[j] * B[k];
+    for (i = 0; i < STATES; ++i)
+      for (j = 0; j <= i; ++j) *rate++ = half[i][j] + half[j][i];
+  }
+  for (i = 0; i < STATES; ++i) rate[i] = known[i] / scale[i];
+  for (k = 0; k < 226; ++k) rate[row[k]] += A[k] * y[column[k]];
 }
 
 EXPORT casadi_int matrices_n_in(void) { return 5; }

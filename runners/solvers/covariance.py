@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from ...codegen.system.evaluation import MatrixEvaluator
+from ...codegen.system.covariance import packed, unpacked
+from ...codegen.system.evaluation import MatrixEvaluator, covariance_rate
 from ...codegen.system.executable import ExecutableSystem
 from ...codegen.system.functions import state_scales
 from ...model.errors import IntegrationError
@@ -69,19 +70,15 @@ def covariance_equation(
     IntegrationError
     """
     system = executable.system
-    n, scale = len(system.states), state_scales(executable.system)
-    sources = [system.noise_columns(source) for source in system.sources]
-    members = np.zeros((len(system.noises), len(sources)))
-    for k, columns in enumerate(sources):
-        members[columns, k] = 1.0
+    n, scale, sources = len(system.states), state_scales(executable.system), len(system.sources)
     start = [
         system.start_covariance_matrix(source, executable.parameters) / np.outer(scale, scale)
         for source in system.sources
     ]
     sizes = typical_sizes(executable, float(np.max(times)))
-    matrices = MatrixEvaluator(executable, ("A", "B", "E", "inputs"))
+    equation = covariance_rate(executable)
     outputs = MatrixEvaluator(executable, ("C", "G", "inputs"))
-    y = np.concatenate([np.array(start).ravel(), np.zeros(n)])
+    y = np.concatenate([packed(np.array(start).reshape(sources, n, n)).ravel(), np.zeros(n)])
     covariances, means = [], []
     begin = system.start
     check_explicit_steps(executable, intervals(executable, begin, float(max(times))), MOST_STEPS)
@@ -89,16 +86,11 @@ def covariance_equation(
         for interval in intervals(executable, begin, node, longest_interval) if node > begin else []:
 
             def rate(t: float, y: NDArray, low: float = interval.low, high: float = interval.high) -> NDArray:
-                A, B, E, inputs = matrices(t, low, high)
-                A, B = A * scale / scale[:, None], B / scale[:, None]
-                half = A @ y[:-n].reshape(len(sources), n, n)
-                derivative = half + half.transpose(0, 2, 1) + (B * members.T[:, None, :]) @ B.T
-                mean = A @ y[-n:] + (E @ inputs[:, 0]) / scale
-                return np.concatenate([derivative.ravel(), mean])
+                return equation(t, low, high, y)
 
             size = sizes and sizes.least(interval.begin, interval.end) / scale
             budgeted = at_most(rate, MOST_STEPS, "t = {:.6g} s")
-            absolute = absolute_part * relative_tolerance * _absolute(size, len(sources), n)
+            absolute = absolute_part * relative_tolerance * _absolute(size, sources, n)
             with np.errstate(over="ignore", invalid="ignore"):  # growth beyond numbers is told below, with its time
                 solution = solve_ivp(
                     budgeted, (interval.begin, interval.end), y, method="DOP853", rtol=relative_tolerance, atol=absolute
@@ -117,7 +109,7 @@ def covariance_equation(
         begin, last = node, interval_before(executable, node)
         C, G, inputs = outputs(begin, last.low, last.high)
         C = C * scale
-        covariances.append(C @ y[:-n].reshape(len(sources), n, n) @ C.T)
+        covariances.append(C @ unpacked(y[:-n], n) @ C.T)
         means.append(C @ y[-n:] + G @ inputs[:, 0])
         if progress:
             progress(float(time))
@@ -130,6 +122,6 @@ def _absolute(size: NDArray | None, sources: int, n: int) -> NDArray[np.float64]
     A state that a source does not move stays exactly zero, whatever is allowed.
     """
     if size is None:
-        return np.full(sources * n * n + n, 1e-3)
-    covariance = np.einsum("si,sj->sij", size[:-1], size[:-1]).ravel()
+        return np.full(sources * n * (n + 1) // 2 + n, 1e-3)
+    covariance = packed(np.einsum("si,sj->sij", size[:-1], size[:-1])).ravel()
     return np.maximum(np.concatenate([covariance, size[-1]]), 1e-250)

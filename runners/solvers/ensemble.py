@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2, t
+from scipy.special import chdtri, stdtrit
 
 from ...codegen.ensemble.compiled import ensemble_of
 from ...codegen.system.executable import ExecutableSystem
@@ -126,7 +126,7 @@ def mean_interval(
 
     m -+ t_{n-1; (1+c)/2} s / sqrt(n); Bendat and Piersol, Random Data, 4th edition, 2010, section 4.4.
     """
-    half = t.ppf(0.5 * (1 + confidence), runs - 1) * std / np.sqrt(runs)
+    half = stdtrit(runs - 1, 0.5 * (1 + confidence)) * std / np.sqrt(runs)
     return mean - half, mean + half
 
 
@@ -136,5 +136,5 @@ def std_interval(std: NDArray, runs: int, confidence: float) -> tuple[NDArray[np
     s sqrt((n-1) / chi2_{n-1; (1+c)/2}) to s sqrt((n-1) / chi2_{n-1; (1-c)/2}); Bendat and Piersol, Random Data,
     4th edition, 2010, section 4.4. Exact for normal runs, which a linear system under normal noise has.
     """
-    low, high = chi2.ppf([0.5 * (1 + confidence), 0.5 * (1 - confidence)], runs - 1)
+    low, high = chdtri(runs - 1, [0.5 * (1 - confidence), 0.5 * (1 + confidence)])
     return std * np.sqrt((runs - 1) / low), std * np.sqrt((runs - 1) / high)

@@ -7,8 +7,7 @@ from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import log_ndtr, ndtri_exp
-from scipy.stats import binom, chi2, nct
+from scipy.special import bdtr, chdtri, log_ndtr, ndtri_exp
 
 from ...model.errors import ParameterValueError, UnknownNameError
 
@@ -125,7 +124,7 @@ def std_sampling_interval(std: float, samples: float, confidence: float = 0.95) 
         Fewer than two samples, or a confidence that is none.
     """
     degrees = _degrees(samples, confidence)
-    low, high = chi2.ppf([0.5 * (1 + confidence), 0.5 * (1 - confidence)], degrees)
+    low, high = chdtri(degrees, [0.5 * (1 - confidence), 0.5 * (1 + confidence)])
     return float(std * np.sqrt(degrees / low)), float(std * np.sqrt(degrees / high))
 
 
@@ -158,6 +157,8 @@ def level_sampling_interval(
     """
     degrees = _degrees(samples, confidence)
     if other_std == 0 and samples <= MOST_SAMPLES:
+        from scipy.stats import nct  # takes a third of a second to import, and nobody else here needs it
+
         noncentral = sigmas * np.sqrt(samples)
         at = nct.ppf([0.5 * (1 - confidence), 0.5 * (1 + confidence)], degrees, noncentral)
         low, high = mean + wind_std * at / np.sqrt(samples)
@@ -211,11 +212,11 @@ def monte_carlo_runs(probability: float, risk: float = 0.10, failures: int = 0) 
             raise ParameterValueError(f"a probability of {probability:g} asks for more runs than can be counted")
         return int(np.ceil(runs))
     low, high = int(failures), int(failures) + 1
-    while binom.cdf(failures, high, probability) > risk:
+    while bdtr(failures, high, probability) > risk:
         low, high = high, 2 * high
         if high > MOST_RUNS:
             raise ParameterValueError(f"a probability of {probability:g} asks for more than a billion runs")
     while high - low > 1:
         middle = (low + high) // 2
-        low, high = (middle, high) if binom.cdf(failures, middle, probability) > risk else (low, middle)
+        low, high = (middle, high) if bdtr(failures, middle, probability) > risk else (low, middle)
     return high
