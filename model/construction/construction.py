@@ -14,6 +14,7 @@ from .consistency import (
     refuse_repeated_stations,
 )
 from .flight import AtmosphereFactors, Drag, EngineGroup, NormalForceComponent, PitchProgramme, Site
+from .given_modes import GivenModes
 from .outline import Outline
 from .structure import LumpedMass, Stiffness, Tank
 from .tank_shape import TankShape
@@ -54,6 +55,8 @@ class Construction:
         or the first mode of potential flow in the tank's own shape.
     outline : Outline or None
         None: axial forces are not computed.
+    modes : GivenModes or None
+        Modes that others computed; None: those of the free beam with ``stiffness``.
     """
 
     name: str
@@ -76,6 +79,7 @@ class Construction:
     end_time: float
     slosh_method: Literal["surface_radius", "cylinder", "potential"] = "surface_radius"
     outline: Outline | None = None
+    modes: GivenModes | None = None
 
     def __post_init__(self):
         places = {"gimbal_station_m": [self.gimbal_station], "sensor_station_m": [self.sensor_station]}
@@ -120,8 +124,23 @@ class Construction:
                 )
             for tank in self.tanks:
                 self.outline.require_around(tank)
+        if self.modes is not None:
+            self._check_modes(self.modes)
         if not self.engines:
             raise DataError("the vehicle has no engines; add [[engines]]")
+
+    def _check_modes(self, modes: GivenModes) -> None:
+        count = modes.frequency.shape[1]
+        if count != self.bending_modes:
+            raise DataError(
+                f"is {self.bending_modes}, but {count} modes are given; make them equal", column="bending_modes"
+            )
+        ends, slack = modes.station[[0, -1]], 1e-6 * (self.forward_end - self.aft_end)
+        if abs(ends[0] - self.aft_end) > slack or abs(ends[1] - self.forward_end) > slack:
+            raise DataError(
+                f"modes are given from {ends[0]:g} to {ends[1]:g} m, the vehicle reaches from {self.aft_end:g} to "
+                f"{self.forward_end:g} m; give them from end to end"
+            )
 
     def forward_of_gimbal(self, station: float) -> float:
         """Return metres forward of the gimbal plane."""

@@ -122,6 +122,7 @@ class ConstructionFile(Section):
     source: str
     masses: FileEntry
     stiffness: FileEntry
+    modes: FileEntry | None = None
     drag: FileEntry
     outline: FileEntry | None = None
     atmosphere: FileEntry | None = None

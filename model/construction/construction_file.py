@@ -26,6 +26,7 @@ from .construction_entries import (
     TankEntry,
 )
 from .flight import AtmosphereFactors, Drag, EngineGroup, NormalForceComponent, PitchProgramme, Site
+from .given_modes import GivenModes
 from .outline import Outline
 from .sizes import check_sizes
 from .structure import LumpedMass, Stiffness, Tank, TankSection
@@ -63,8 +64,9 @@ def load_construction(folder: Path, changes: Mapping[str, Any] | None = None) ->
     """
     toml = file_inside(folder, CONSTRUCTION_FILE)
     entry = read_toml(toml, ConstructionFile, changes)
-    masses = _masses(file_inside(folder, entry.masses.file), entry.aft_end_m, entry.forward_end_m)
-    stiffness = _stiffness(file_inside(folder, entry.stiffness.file))
+    masses = read_masses(file_inside(folder, entry.masses.file), entry.aft_end_m, entry.forward_end_m)
+    stiffness = read_stiffness(file_inside(folder, entry.stiffness.file))
+    modes = None if entry.modes is None else read_modes(file_inside(folder, entry.modes.file))
     drag = _drag(file_inside(folder, entry.drag.file))
     outline = None if entry.outline is None else _outline(file_inside(folder, entry.outline.file))
     atmosphere = None if entry.atmosphere is None else _atmosphere(file_inside(folder, entry.atmosphere.file))
@@ -99,6 +101,7 @@ def load_construction(folder: Path, changes: Mapping[str, Any] | None = None) ->
             end_time=entry.end_time_s,
             slosh_method=entry.slosh_method,
             outline=outline,
+            modes=modes,
         )
     check_sizes(construction, toml)
     return construction
@@ -108,7 +111,7 @@ def construction_files(folder: Path) -> tuple[Path, ...]:
     """Return construction.toml and every file that it names, in its order, each once."""
     toml = file_inside(folder, CONSTRUCTION_FILE)
     entry = read_toml(toml, ConstructionFile)
-    parts = (entry.masses, entry.stiffness, entry.drag, entry.outline, entry.atmosphere, entry.pitch)
+    parts = (entry.masses, entry.stiffness, entry.modes, entry.drag, entry.outline, entry.atmosphere, entry.pitch)
     names = [p.file for p in (*parts, *entry.engines, *entry.normal_force) if p is not None]
     return (toml, *(file_inside(folder, name) for name in dict.fromkeys(names)))
 
@@ -139,7 +142,8 @@ def _read(
     return table
 
 
-def _masses(file: Path, aft_end: float, forward_end: float) -> tuple[LumpedMass, ...]:
+def read_masses(file: Path, aft_end: float = -math.inf, forward_end: float = math.inf) -> tuple[LumpedMass, ...]:
+    """Read a table of masses; as :func:`load_construction`."""
     table = _read(file, "begin", "m", "any", ("item", *_ORIGIN))
     columns = zip(
         table.text["item"],
@@ -165,7 +169,8 @@ def _masses(file: Path, aft_end: float, forward_end: float) -> tuple[LumpedMass,
     return tuple(masses)
 
 
-def _stiffness(file: Path) -> Stiffness:
+def read_stiffness(file: Path) -> Stiffness:
+    """Read a table of stiffness; as :func:`load_construction`."""
     table = _read(file, "station", "m", "not decreasing", ("item", *_ORIGIN))
     bending, shear = table.column("bending", "N m2"), table.column("shear", "N")
     for column in ("bending", "shear"):
@@ -187,6 +192,51 @@ def _warn_of_bridged_items(table: CsvTable) -> None:
                 PlausibilityWarning,
                 stacklevel=4,
             )
+
+
+def read_modes(file: Path) -> GivenModes:
+    """Read a table of modes, of any normalisation and sign; as :func:`load_construction`."""
+    table = _read(file, "time", "s", "not decreasing")
+    units = {
+        "mode": "1",
+        "frequency": "rad/s",
+        "generalized_mass": "kg",
+        "station": "m",
+        "displacement": "1",
+        "rotation": "1/m",
+    }
+    time, columns = table.columns["time"], {name: table.column(name, unit) for name, unit in units.items()}
+    times, stations = np.unique(time), np.unique(columns["station"])
+    count = int(columns["mode"].max())
+    order = np.lexsort((columns["station"], columns["mode"], time))
+    expected = [g.ravel() for g in np.meshgrid(times, np.arange(1, count + 1), stations, indexing="ij")]
+    found = [values[order] for values in (time, columns["mode"], columns["station"])]
+    shape = (times.size, count, stations.size)
+    if time.size != np.prod(shape) or any((a != b).any() for a, b in zip(found, expected, strict=True)):
+        raise DataError(
+            f"has {time.size} rows; every mode from 1 to {count} takes a row at each of {times.size} times and "
+            f"{stations.size} stations, {np.prod(shape)} in all",
+            file=file,
+        )
+    arrays = {name: columns[name][order].reshape(shape) for name in units if name not in ("mode", "station")}
+    for name in ("frequency", "generalized_mass"):
+        differs = np.flatnonzero((arrays[name] != arrays[name][..., :1]).ravel())
+        if differs.size:
+            raise DataError(
+                "differs from station to station of one mode and time; make it equal",
+                file=file,
+                column=name,
+                row=table.lines[order[differs[0]]],
+            )
+    with _located(file):
+        return GivenModes.scaled(
+            times,
+            stations,
+            arrays["frequency"][..., 0],
+            arrays["generalized_mass"][..., 0],
+            arrays["displacement"],
+            arrays["rotation"],
+        )
 
 
 def _outline(file: Path) -> Outline:

@@ -27,6 +27,7 @@ FILES = {  # command: its file in this folder, where a function or a group of th
     "design": "design",
     "vehicles": "vehicles",
     "new-vehicle": "vehicles",
+    "import-structure": "vehicles",
     "build-vehicle": "vehicles",
     "wind": "wind",
     "reproduce": "reproduce",

@@ -1,4 +1,4 @@
-"""The commands about vehicle folders: ``vehicles``, ``new-vehicle`` and ``build-vehicle``."""
+"""The commands about vehicle folders: ``vehicles``, ``new-vehicle``, ``import-structure`` and ``build-vehicle``."""
 
 from __future__ import annotations
 
@@ -36,6 +36,22 @@ def new_vehicle(
 
     copied = copy_vehicle(source, folder)
     console.print(f"{len(copied)} files in {folder}; edit vehicle.toml, then 'ascentwind run {folder}'", soft_wrap=True)
+
+
+def import_structure(
+    source: Annotated[
+        Path, typer.Argument(help="Mapping file (.toml) of a NASTRAN deck and its results, or a workbook (.xlsx).")
+    ],
+    out: Annotated[Path, typer.Option(help="Folder for masses.csv, stiffness.csv and modes.csv.")],
+) -> None:
+    """Masses, stiffness and bending modes from NASTRAN or a spreadsheet, as tables of a construction."""
+    from ..construct.sources.import_structure import import_structure as import_tables
+
+    with console.status("reading"):
+        written, checks = import_tables(source, out)
+    for sentence in checks:
+        console.print(sentence, soft_wrap=True, markup=False)
+    print_files(written, out)
 
 
 def build_vehicle(

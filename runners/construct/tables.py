@@ -55,7 +55,8 @@ def vehicle_tables(numbers: VehicleNumbers, file: VehicleFile) -> dict[str, tupl
         ),
     }
     for i, mode in enumerate(file.bending):
-        note = "free-free Timoshenko beam, all liquid frozen, displacement 1 at the forward end"
+        origin = "free-free Timoshenko beam, all liquid frozen" if construction.modes is None else "modes as given"
+        note = f"{origin}, displacement 1 at the forward end"
         tables[mode.table.file] = note, time | _bending(numbers, i)
     for tank in file.slosh:
         found = numbers.slosh[tank.name]

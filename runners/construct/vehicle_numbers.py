@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ...model.construction import Construction
 from . import aerodynamics
 from .ascent.mean_flight import MeanFlight, fly
+from .beam.given import given_modes
 from .beam.modes import ModeHistory, followed_modes
 from .line_integrals import Line
 from .loads import LoadCoefficients, LoadedVehicle, axial_coefficients, load_coefficients, shear_coefficients
@@ -103,7 +104,10 @@ def compute_vehicle(
         if tank.sloshes
     }
     done(STEPS[3])
-    modes = followed_modes(construction, flight.time, flight.liquid, construction.bending_modes)
+    if construction.modes is None:
+        modes = followed_modes(construction, flight.time, flight.liquid, construction.bending_modes)
+    else:
+        modes = given_modes(construction, flight.time, flight.liquid)
     done(STEPS[4])
     stations = along_stations(construction)
     line = Line.cut_at(modes.x, aerodynamics.knots(construction), stations)

@@ -72,14 +72,14 @@ class FreeBeam:
         x = np.asarray(edges, dtype=float)
         elements = element_flexibilities(construction.stiffness, x + construction.gimbal_station)
         turn = static_rotations(elements, x)
-        rotary = turn.T @ _line_matrix(rotary_line(construction, x)) @ turn
+        rotary = turn.T @ line_matrix(rotary_line(construction, x)) @ turn
         return cls(x, cantilever_flexibility(elements, x), turn, 0.5 * (rotary + rotary.T), construction.gimbal_station)
 
     def product(
         self, element_masses: NDArray[np.float64], first: NDArray[np.float64], second: NDArray[np.float64]
     ) -> NDArray[np.float64]:
         """Return the integrals of mass times displacements (j, n) and (k, n), rotations included: (j, k) in kg."""
-        return first @ (_line_matrix(element_masses) + self.rotary) @ second.T
+        return first @ (line_matrix(element_masses) + self.rotary) @ second.T
 
     def eigenmodes(
         self, element_masses: NDArray[np.float64], count: int
@@ -94,7 +94,7 @@ class FreeBeam:
             begin, end = self.x[empty[0]] + self.gimbal_station, self.x[empty[0] + 2] + self.gimbal_station
             raise ModeError(f"no mass lies between {begin:g} and {end:g} m; spread one over these stations")
         # L^T G L with M = L L^T, rigid-body motion taken out of loads and displacements: eigenvalues 1 / omega^2
-        lower = cholesky(_line_matrix(element_masses) + self.rotary, lower=True)
+        lower = cholesky(line_matrix(element_masses) + self.rotary, lower=True)
         rigid, _ = np.linalg.qr(lower.T @ np.column_stack([np.ones(self.x.size), self.x]))
         loose = lower - (lower @ rigid) @ rigid.T
         last = self.x.size - 1
@@ -148,7 +148,7 @@ def beam_modes(
     return beam.scaled(*beam.eigenmodes(np.asarray(element_masses, dtype=float), count), time)
 
 
-def _line_matrix(masses: NDArray[np.float64]) -> NDArray[np.float64]:
+def line_matrix(masses: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the mass matrix of nodal values that are linear between nodes."""
     diagonal = (np.append(masses, 0.0) + np.insert(masses, 0, 0.0)) / 3
     return np.diag(diagonal) + np.diag(masses / 6, 1) + np.diag(masses / 6, -1)

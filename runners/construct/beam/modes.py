@@ -17,7 +17,7 @@ from ..mass.line import beam_edges, mass_line
 from .beam import FreeBeam
 
 _SPARE_MODES = 3  # beyond those asked for: one of them may cross into the range
-_LEAST_LIKENESS = 0.8
+LEAST_LIKENESS = 0.8
 _HALVINGS = 8
 
 _Step = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]  # frequency, shapes, likeness
@@ -94,7 +94,7 @@ def followed_modes(
         alike = beam.product(masses, shapes, candidates) ** 2 / own[:, None]
         rows, columns = linear_sum_assignment(-alike)
         likeness = alike[rows, columns]
-        if likeness.min() >= _LEAST_LIKENESS:
+        if likeness.min() >= LEAST_LIKENESS:
             return frequency[columns], candidates[columns], likeness
         if halvings == 0:
             raise ModeError(

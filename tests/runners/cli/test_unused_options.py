@@ -117,6 +117,7 @@ KNOWN = {
     "mean": {"out", "changes"},
     "design": {"out", "trades", "changes"},
     "reproduce": {"out"},
+    "import-structure": {"out"},
     "build-vehicle": {"out", "figures", "spacing"},
     "wind apply": {
         "component", "components", "azimuth", "sign", "period", "edition", "soundings", "site", "matrix",
