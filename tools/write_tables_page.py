@@ -15,7 +15,8 @@ SIGNS = {"+": "above 0", "0": "0 or above", "": ""}
 TABLES: tuple[tuple[str, Sequence[c.Column]], ...] = (
     ("`[tables.rigid_body]`", (c.TIME, *c.RIGID_BODY)),
     ("`[tables.trajectory]`", (c.TIME, *c.TRAJECTORY)),
-    ("`[tables.trajectory]`, where its heading turns, for both planes", (c.AZIMUTH_CHANGE,)),
+    ("`[tables.trajectory]`, for `options.trajectory_angle_of_attack`", tuple(c.OWN_ANGLE.values())),
+    ("`[tables.trajectory]`, for `wind.azimuth_change`", (c.AZIMUTH_CHANGE,)),
     ("`[tables.propulsion]`", (c.TIME, *c.PROPULSION)),
     ("`[tables.aerodynamics]`", (c.TIME, *c.AERODYNAMICS)),
     ("`[tables.aerodynamics]`, of a plane that is not symmetrical", (c.ZERO_ANGLE,)),

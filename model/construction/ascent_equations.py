@@ -39,6 +39,9 @@ OBSERVED = (
     "flight_path_angle",
     "pitch",
     "angle_of_attack",
+    "angle_of_attack_pitch",
+    "angle_of_attack_yaw",
+    "azimuth_change",
     "inertial_speed",
     "inertial_flight_path_angle",
     "surface_range",
@@ -130,6 +133,9 @@ def ascent_equations(construction: Construction, along_velocity: bool = False) -
         ca.DM(earth.site_position(site.latitude, 0.0)),
     )
     across = ca.norm_2(ca.cross(site_now, position))
+    pitch, right = ca.atan2(ca.dot(axis, downrange), ca.dot(axis, up)), ca.cross(downrange, up)
+    over = ca.cos(pitch) * downrange - ca.sin(pitch) * up
+    along = ca.dot(relative, axis)
     observed = {
         "altitude": altitude,
         "relative_velocity": speed,
@@ -142,8 +148,11 @@ def ascent_equations(construction: Construction, along_velocity: bool = False) -
         "axial_acceleration": (thrust - drag) / mass,
         "mass": mass,
         "flight_path_angle": _elevation(relative, normal),
-        "pitch": ca.atan2(ca.dot(axis, downrange), ca.dot(axis, up)),
-        "angle_of_attack": ca.atan2(ca.norm_2(lateral), ca.dot(relative, axis)),
+        "pitch": pitch,
+        "angle_of_attack": ca.atan2(ca.norm_2(lateral), along),
+        "angle_of_attack_pitch": -ca.atan2(ca.dot(lateral, over), along),
+        "angle_of_attack_yaw": -ca.atan2(ca.dot(lateral, right), along),
+        "azimuth_change": _turn(downrange, position, normal, site.azimuth),
         "inertial_speed": ca.norm_2(velocity),
         "inertial_flight_path_angle": _elevation(velocity, normal),
         "surface_range": ca.atan2(across, ca.dot(site_now, position)) * ca.norm_2(site_now),
@@ -156,6 +165,15 @@ def ascent_equations(construction: Construction, along_velocity: bool = False) -
         state_size=state.numel(),
         piece_size=piece.numel(),
     )
+
+
+def _turn(downrange: ca.DM, position: ca.MX, normal: ca.MX, azimuth: float) -> ca.MX:
+    """Return how far a horizontal axis lies to the right of an azimuth from the north of where the vehicle is (rad)."""
+    east = ca.cross(ca.DM([0, 0, 1]), position)
+    east = east / ca.norm_2(east)
+    east_part, north_part = ca.dot(downrange, east), ca.dot(downrange, ca.cross(normal, east))
+    sin, cos = np.sin(azimuth), np.cos(azimuth)
+    return ca.atan2(east_part * cos - north_part * sin, east_part * sin + north_part * cos)
 
 
 def _elevation(vector: ca.MX, normal: ca.MX) -> ca.MX:

@@ -9,6 +9,7 @@ import casadi as ca
 
 from ..system.labels import Output
 from ..vehicle.biases import WIND_BIAS
+from ..vehicle.columns import OWN_ANGLE
 from ..vehicle.loads import AXIAL_FORCE, load_name
 from ..vehicle.planes import Plane
 from . import rigid_body
@@ -81,7 +82,8 @@ def plane_equations(plane: Plane, numbers: Numbers, turbulence: ca.SX, winds: Wi
         deviation = numbers.biases[WIND_BIAS].deviation
         met = [wind + deviation * expected for wind, expected in zip(met, winds.expected, strict=True)]
     zones = penetration(in_plane(plane, numbers, met) + turbulence, numbers.zones, numbers.tables)
-    alpha = rigid_body.angle_of_attack(numbers.tables, motion.attitude, motion.lateral_velocity, zones.reference)
+    own = _own_angle(plane, numbers)
+    alpha = rigid_body.angle_of_attack(numbers.tables, motion.attitude, motion.lateral_velocity, zones.reference) + own
     blocks = [
         *_rigid_body(motion, solved),
         *control.blocks,
@@ -101,6 +103,8 @@ def plane_equations(plane: Plane, numbers: Numbers, turbulence: ca.SX, winds: Wi
         handles=handles,
     )
     rates, output = deviated(vehicle, numbers, motion, equations)
+    # the flight without wind has turned under that force already: Y is measured from it
+    rates[0] -= rigid_body.normal_force_slope(numbers.tables, numbers.area) * own / numbers.tables["mass"]
     blocks = _with_rates(blocks, rates, plane.prefix)
     labels = tuple(_named(plane, label) for label, _ in responses)
     return PlaneEquations(tuple(blocks[:moving]), tuple(blocks[moving:]), labels, output, solved.matrix)
@@ -121,6 +125,13 @@ def in_plane(plane: Plane, numbers: Numbers, winds: Sequence[ca.SX]) -> ca.SX:
     if plane.name == "yaw" or plane.vehicle.file.wind.pitch_wind == "horizontal":
         return wind
     return numbers.tables["altitude_rate"] / numbers.tables["relative_velocity"] * wind
+
+
+def _own_angle(plane: Plane, numbers: Numbers) -> ca.SX:
+    """Return the angle of attack of the flight without wind itself, rad, where the vehicle's options take it in."""
+    if not plane.vehicle.file.options.trajectory_angle_of_attack:
+        return ca.SX(0)
+    return numbers.tables[OWN_ANGLE[plane.name].name] * numbers.undisturbed
 
 
 def _with_rates(blocks: Sequence[Block], rates: ca.SX, prefix: str) -> list[Block]:

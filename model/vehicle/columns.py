@@ -38,8 +38,13 @@ TRAJECTORY = (
     Column("axial_acceleration", "m/s2", "", "(thrust - axial_drag) / mass"),
     Column("axial_drag", "N", "", "air force along the axis, positive aft"),
 )
+# of the flight without wind itself, by plane
+OWN_ANGLE = {
+    "pitch": Column("angle_of_attack_pitch", "rad", "", "of the flight without wind, nose over from its path +"),
+    "yaw": Column("angle_of_attack_yaw", "rad", "", "of the flight without wind, nose to the right of its path +"),
+}
 AZIMUTH_CHANGE = Column(
-    "azimuth_change", "rad", "", "turn of the flight path's heading towards the right, from its azimuth"
+    "azimuth_change", "rad", "", "how far the pitch plane has turned to the right from the azimuth of the flight"
 )
 PROPULSION = (
     Column("thrust", "N", "0", "of all engines"),

@@ -34,6 +34,7 @@ from .columns import (
     AZIMUTH_CHANGE,
     GAINS,
     MOVED_MODE,
+    OWN_ANGLE,
     PREFIX,
     PROPULSION,
     RIGID_BODY,
@@ -74,6 +75,7 @@ REGULAR = 1.5  # times the usual step: in a table whose other steps are shorter,
 CONSTRUCTION_FILE = "construction.toml"
 IN_TITLE = {"yaw": "yaw plane", "pitch": "pitch plane", "both": "both planes"}  # of a title that names the plane
 SAME_AZIMUTH = 1e-6  # deg
+LARGEST_OWN_ANGLE = math.radians(30.0)  # of attack, of a flight without wind
 FORMER_Q_ALPHA = "dynamic_pressure_times_angle_of_attack"
 
 
@@ -113,12 +115,16 @@ def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehi
     if file.planes != "yaw" and file.options.mean_response == "nonlinear":
         why = f'is of the yaw plane, and planes = "{file.planes}"; set it to "linear"'
         reader.collector.errors.append(DataError(why, file=toml, column="options.mean_response"))
+    if file.options.trajectory_angle_of_attack and file.options.mean_response == "nonlinear":
+        why = 'is of the linear mean, and mean_response = "nonlinear"; leave one of them out'
+        reader.collector.errors.append(DataError(why, file=toml, column="options.trajectory_angle_of_attack"))
     reader.collector.errors += [DataError(why, file=toml, column=key) for key, why in name_faults(file)]
     file = _with_noise_loads(file, folder, toml)
     names = plane_names(file)
-    turns = (AZIMUTH_CHANGE,)
     reader.add("rigid_body", file.tables.rigid_body, RIGID_BODY)
-    reader.add("trajectory", file.tables.trajectory, TRAJECTORY, "", turns, turns if len(names) > 1 else ())
+    flown = tuple(column for column in _ASKED_FOR if column in _asked_of_trajectory(file))
+    reader.add("trajectory", file.tables.trajectory, (*TRAJECTORY, *flown), "", _ASKED_FOR)
+    own_angles = _own_angles(reader, file.tables.trajectory)
     reader.add("propulsion", file.tables.propulsion, PROPULSION)
     if len(names) == 1:
         _add_tables(reader, plane_file(file, next(iter(names))))
@@ -169,11 +175,47 @@ def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehi
         sources=tuple(reader.sources),
         turbulence=turbulence,
         zones=zones,
+        own_angles=own_angles,
     )
     for plane in flown_planes(vehicle):
         check_plausibility(plane.vehicle)
     _check_coverage(reader, wind, turbulence, start, last.last)
     return vehicle
+
+
+# columns of the trajectory that an option asks for, and it
+_ASKED_FOR = {
+    **dict.fromkeys(OWN_ANGLE.values(), "options.trajectory_angle_of_attack"),
+    AZIMUTH_CHANGE: "wind.azimuth_change",
+}
+
+
+def _asked_of_trajectory(file: VehicleFile) -> set[Column]:
+    """Return the columns that a vehicle's options ask for."""
+    own = {OWN_ANGLE[plane] for plane in plane_names(file)} if file.options.trajectory_angle_of_attack else set()
+    return own | ({AZIMUTH_CHANGE} if file.wind.azimuth_change and file.planes == BOTH else set())
+
+
+def _own_angles(reader: _Reader, entry: TableEntry) -> dict[str, Table]:
+    """Return the angles of attack of the flight without wind itself, by plane, where its table has them."""
+    found = {}
+    with reader.collector.part():
+        csv = read_csv_table(file_inside(reader.folder, entry.file), TIME.name, TIME.unit)
+        breaks = tuple(sorted(reader.events[event] for event in entry.events if event in reader.events))
+        for plane, column in OWN_ANGLE.items():
+            if column.name in csv.columns:
+                values = csv.column(column.name, column.unit)
+                large = np.flatnonzero(np.abs(values) > LARGEST_OWN_ANGLE)
+                if large.size:
+                    raise DataError(
+                        f"is {values[large[0]]:g} rad, {math.degrees(values[large[0]]):.0f} degrees, at which no "
+                        "vehicle climbs; is it in degrees?",
+                        file=csv.file,
+                        column=column.name,
+                        row=csv.lines[large[0]],
+                    )
+                found[plane] = Table(column.name, column.unit, csv.columns["time"], values, entry.interpolation, breaks)
+    return found
 
 
 EVERYTHING = frozenset((*SECTIONS, *PlaneTablesEntry.model_fields))
@@ -262,6 +304,7 @@ def _refuse_unused(changes: Mapping[str, Any], file: VehicleFile, toml: Path) ->
         for idle, concerned, why in (
             (not file.wind.fitted, parts[:2] == ["wind", "filter"], 'wind.synthesis = "fitted"'),
             (file.wind.fitted, parts[:2] == ["wind", "correlation"], 'wind.synthesis = "closed_form"'),
+            (file.planes != BOTH, parts[:2] == ["wind", "azimuth_change"], 'planes = "both"'),
             (
                 not file.options.local_angle_of_attack,
                 "local_aerodynamics" in parts or (parts[0] == "loads" and "local" in parts),
@@ -332,7 +375,7 @@ class _Reader:
         x, collector = csv.columns[argument.name], DataErrorCollector()
         for column in columns:
             with collector.part():
-                if column.name not in csv.columns and (key := needed_for(column.name)):
+                if column.name not in csv.columns and (key := needed_for(column.name) or _ASKED_FOR.get(column)):
                     why = f"is missing, but {key} needs it; 'ascentwind build-vehicle' writes it"
                     raise DataError(why, file=csv.file, column=column.label)
                 csv.column(column.name, column.unit)
@@ -522,6 +565,8 @@ def _load_wind(vehicle: VehicleFile, reader: _Reader) -> WindModel:
                 file=reader.toml,
                 column="wind.azimuth_deg",
             )
+    if entry.azimuth_deg is not None:
+        _check_azimuth(entry.azimuth_deg, reader)
     try:
         check_plausible("the wind's statistics", h, mean, sigma)
         if record is not None:

@@ -14,7 +14,7 @@ def table_columns(file: VehicleFile) -> dict[str, tuple[Column, ...]]:
     by_option = (*c.REACTION, *c.by_need_columns(modes))
     found = {
         tables.rigid_body.file: c.RIGID_BODY,
-        tables.trajectory.file: c.TRAJECTORY,
+        tables.trajectory.file: (*c.TRAJECTORY, *c.OWN_ANGLE.values(), c.AZIMUTH_CHANGE),
         tables.propulsion.file: c.PROPULSION,
         tables.aerodynamics.file: c.AERODYNAMICS,
         control.gains.file: c.GAINS,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
@@ -59,6 +59,9 @@ class Vehicle:
         Beside the wind of the statistics, whichever that is.
     zones : Zones, optional
         That enter a gust one after the other; without, the whole vehicle feels one wind.
+    own_angles : dict of str to Table
+        Angle of attack of the flight without wind itself (rad) by plane, where the trajectory's table has it; whether
+        the equations take it in is ``options.trajectory_angle_of_attack``.
     """
 
     name: str
@@ -73,6 +76,7 @@ class Vehicle:
     sources: tuple[TableSource, ...]
     turbulence: Turbulence | None = None
     zones: Zones | None = None
+    own_angles: dict[str, Table] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         parts = f"{len(self.bending)} bending modes, {len(self.slosh)} slosh masses, {len(self.noise)} noises"

@@ -266,10 +266,12 @@ class ComponentsEntry(Section):
 class WindEntry(Section):
     """``synthesis`` chooses between ``filter``, a file of 'ascentwind wind fit', and [wind.correlation].
 
-    In both planes it is ``components``, turned by ``azimuth_deg``, from north towards east.
+    In both planes it is ``components``, turned by ``azimuth_deg``, from north towards east, and with ``azimuth_change``
+    by the trajectory's column of that name.
     """
 
     azimuth_deg: Annotated[float, Field(ge=0, le=360)] | None = None
+    azimuth_change: Annotated[bool, STRUCTURE] = False
     pitch_wind: Annotated[Literal["normal", "horizontal"], STRUCTURE] = "normal"
     components: ComponentsEntry | None = None
     synthesis: Annotated[Literal["fitted", "closed_form"] | None, STRUCTURE] = None
@@ -312,6 +314,7 @@ class OptionsEntry(Section):
     p_delta: bool = False
     noise_loads: NoiseLoads = "moved_line"
     mean_response: Literal["linear", "nonlinear"] = "linear"
+    trajectory_angle_of_attack: bool = False
     extra_outputs: tuple[ExtraOutput, ...] = ()
     gust_zones: Annotated[Whole, Field(ge=1)] | None = None
 

@@ -68,6 +68,7 @@ def run(
     from ..case.times import parse_times
     from ..flight_load.files import with_flight_levels
     from ..flight_load.load import DESIGN
+    from ..present.files import write_text
     from ..present.style import words, write_figure
     from ..statistics.engines import engine_from
     from ..statistics.larger_side import LABEL
@@ -79,6 +80,7 @@ def run(
     from ..views.along_vehicle_files import prepare_along_vehicle, write_along_vehicle
     from ..views.azimuth_sweep import check_turns, checked_azimuths
     from ..views.resultants_along_vehicle import write_resultants_along
+    from ..views.trajectory_angle import in_words, trajectory_angle, trajectory_angle_csv
 
     chances = checked_probabilities(probability) if probability else ()
     settings = {"method": method, "relative_tolerance": tolerance}
@@ -116,6 +118,9 @@ def run(
     job.written += statistics.save(job.folder)
     if both is not None:
         job.written += both.save(job.folder)
+    own = trajectory_angle(flown, end_times) if flown.file.planes != "yaw" else None
+    if own is not None:
+        job.written.append(write_text(job.folder / "trajectory_angle_of_attack.csv", trajectory_angle_csv(own)))
     with console.status("peaks again by another road"):
         check = _check_peaks(study, statistics)
     if check is not None:
@@ -157,6 +162,9 @@ def run(
     _print_peaks(statistics)
     if both is not None:
         _print_resultants(both)
+    if own is not None:
+        for sentence in in_words(own):
+            console.print(sentence, style="dim", markup=False, highlight=False, soft_wrap=True)
     for chance in chances:
         _print_instant_levels(statistics, chance)
     if loads:

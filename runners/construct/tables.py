@@ -31,7 +31,7 @@ def vehicle_tables(numbers: VehicleNumbers, file: VehicleFile) -> dict[str, tupl
     tables = {
         file.tables.rigid_body.file: ("center_of_gravity: metres forward of the gimbal plane", time | _rigid(numbers)),
         file.tables.trajectory.file: (
-            "axial_acceleration: (thrust - drag) / mass",
+            "axial_acceleration: (thrust - drag) / mass; angles of attack: nose over and to the right +",
             time
             | {
                 ("altitude", "m"): flight.altitude,
@@ -39,6 +39,9 @@ def vehicle_tables(numbers: VehicleNumbers, file: VehicleFile) -> dict[str, tupl
                 ("dynamic_pressure", "Pa"): flight.dynamic_pressure,
                 ("axial_acceleration", "m/s2"): flight.axial_acceleration,
                 ("axial_drag", "N"): flight.drag,
+                ("angle_of_attack_pitch", "rad"): flight.angle_of_attack_pitch,
+                ("angle_of_attack_yaw", "rad"): flight.angle_of_attack_yaw,
+                ("azimuth_change", "rad"): flight.azimuth_change,
             },
         ),
         file.tables.propulsion.file: (

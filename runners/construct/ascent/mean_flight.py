@@ -45,6 +45,12 @@ class MeanFlight:
         Of the axis in the plumbline frame, 0 vertical, positive downrange (rad).
     angle_of_attack : (n,) array
         Between axis and relative velocity (rad).
+    angle_of_attack_pitch, angle_of_attack_yaw : (n,) arrays
+        In the pitch plane of the plumbline frame, positive where the nose is pitched over from the relative velocity,
+        and across it, positive where the nose is to the right of it (rad).
+    azimuth_change : (n,) array
+        How far that pitch plane, which does not turn with the Earth, lies to the right of the flight's azimuth by the
+        north of where the vehicle is (rad).
     inertial_speed, inertial_flight_path_angle : (n,) arrays
         m/s, rad.
     surface_range : (n,) array
@@ -73,6 +79,9 @@ class MeanFlight:
     flight_path_angle: Array
     pitch: Array
     angle_of_attack: Array
+    angle_of_attack_pitch: Array
+    angle_of_attack_yaw: Array
+    azimuth_change: Array
     inertial_speed: Array
     inertial_flight_path_angle: Array
     surface_range: Array

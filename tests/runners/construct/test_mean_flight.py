@@ -17,7 +17,8 @@ from ascentwind.model.construction.construction_file import load_construction
 from ascentwind.model.construction.flight import AtmosphereFactors, Drag, EngineGroup, PitchProgramme
 from ascentwind.model.errors import DataError
 from ascentwind.model.vehicle.shipped import built_in_vehicles
-from ascentwind.runners.construct.ascent.mean_flight import EVENT_MARGIN, MeanFlight, fly
+from ascentwind.runners.construct.ascent.integration import Ascent
+from ascentwind.runners.construct.ascent.mean_flight import EVENT_MARGIN, MeanFlight, _edges, _leg_of, _legs, fly
 from ascentwind.runners.reproduction.as506.flight import trajectory_checks
 
 
@@ -101,6 +102,33 @@ def test_atmosphere_is_the_standard_times_its_factors():
             standard.pressure[0],
         ]
         np.testing.assert_allclose([float(v) for v in values(altitude)], expected, rtol=2e-5)
+
+
+def test_angles_of_attack_by_plane_and_turn_of_the_pitch_plane(construction, flight):
+    """By vectors of the state: in and across the plane of the programme, and that plane by the north below."""
+    ascent = Ascent(construction)
+    legs, _ = _legs(ascent, _edges(construction, flight.time))
+    up, downrange = earth.plumbline_axes(construction.site.latitude, construction.site.azimuth)
+    for time in (10.0, 40.0, 70.0, 120.0):
+        state, row = ascent.state(_leg_of(legs, time), time), int(np.argmin(np.abs(flight.time - time)))
+        relative = state[3:6] - np.cross([0.0, 0.0, earth.ROTATION_RATE], state[:3])
+        pitch = flight.pitch[row]
+        body = np.array(
+            [
+                np.cos(pitch) * up + np.sin(pitch) * downrange,
+                np.cos(pitch) * downrange - np.sin(pitch) * up,
+                np.cross(downrange, up),
+            ]
+        )
+        forward, over, right = body @ relative
+        assert np.tan(flight.angle_of_attack_pitch[row]) == pytest.approx(-over / forward, rel=1e-8)
+        assert np.tan(flight.angle_of_attack_yaw[row]) == pytest.approx(-right / forward, rel=1e-8)
+        total = np.hypot(over, right) / forward
+        assert np.tan(flight.angle_of_attack[row]) == pytest.approx(total, rel=1e-8)
+        normal = ca.evalf(earth.geodetic(ca.MX(ca.DM(state[:3])))[1]).full().ravel()
+        east = np.cross([0.0, 0.0, 1.0], normal)
+        heading = np.arctan2(downrange @ east, downrange @ np.cross(normal, east))
+        assert flight.azimuth_change[row] == pytest.approx(heading - construction.site.azimuth, abs=1e-9)
 
 
 @pytest.mark.slow
