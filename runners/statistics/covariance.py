@@ -13,7 +13,7 @@ from ..solvers.tolerances import check_absolute_part, check_relative_tolerance
 from .dataset import statistics_dataset, with_covariance
 from .engine import Engine, Progress, begun_anew
 
-LEAST_TOLERANCE = 1e-13
+LEAST_TOLERANCE = 1e-12  # finer ones lie within the rounding of the right-hand side: steps are refused without end
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class CovarianceEquation(Engine):
     Parameters
     ----------
     relative_tolerance : float
-        Relative, of every covariance, between 1e-13 and 1e-2.
+        Relative, of every covariance, between 1e-12 and 1e-2.
     absolute_part : float
         The absolute tolerance as a part of the relative one, of the sizes that each source gives the states
         (runners/solvers/typical_sizes.py): one that hardly moves the vehicle gives covariances many orders smaller
