@@ -25,7 +25,6 @@ from .flight_load.limit_table import Limits
 from .flight_load.limits import limit_passage
 from .flight_load.load import DESIGN, DRAWS, FlightLoad, flight_load
 from .flight_load.passage import Passage
-from .flight_load.resultant import ResultantLoad, resultant_load
 from .flight_load.window import checked_window
 from .gusts.response import gust_response
 from .gusts.search import GustSweep, gust_sweep
@@ -314,6 +313,8 @@ class Study(Case):
         Parameters
         ----------
         response : str
+            Of a system in both planes the name of a resultant too, such as 'resultant_bending_moment': the largest norm
+            of both planes, jointly, whose level is looked for in the part of the window where it is passed.
         window : (float, float), optional
             s; a vehicle's default times without it, the whole flight of other systems.
         probabilities : float or iterable of float
@@ -323,7 +324,7 @@ class Study(Case):
             What the size of the response may not pass, over time; ``passage`` of the result says with what chance a
             flight does, and what margin is left.
         sides : {'both', 'upper', 'lower'}
-            Of the response's size, both sides together; of the response; or of its negative.
+            Of the response's size, both sides together; of the response; or of its negative. A resultant is a size.
         draws : int
             Paths of the importance sampling: 2000 give a probability to some 3 %.
         seed : int
@@ -337,6 +338,8 @@ class Study(Case):
         Raises
         ------
         UnknownNameError, TimeRangeError, ParameterValueError, DirectNoiseError, NoVarianceError, LimitError
+        PlanesError
+            A resultant of a system in one plane.
 
         Warns
         -----
@@ -366,8 +369,9 @@ class Study(Case):
         Parameters
         ----------
         limits : path or Limits
-            Over time: of responses. Over stations, or both: of bending moment, shear force, axial force or equivalent
-            axial load along the vehicle, at each of the vehicle's stations that lies between theirs.
+            Over time: of responses and resultants. Over stations, or both: of bending moment, shear force, axial force
+            or equivalent axial load along the vehicle, at each of the vehicle's stations that lies between theirs; of a
+            vehicle in both planes of the resultants of bending moment and shear force.
         window : (float, float), optional
             As for :meth:`flight_load`, s.
         probability : float
@@ -395,41 +399,6 @@ class Study(Case):
             The vehicle has stations outside those of the table.
         """
         return limit_passage(self, limits, window, probability, sides, draws, seed)
-
-    def resultant_load(
-        self,
-        resultant: str,
-        window: tuple[float, float] | None = None,
-        probabilities: float | Iterable[float] = DESIGN,
-        *,
-        draws: int = DRAWS,
-        seed: int = 504,
-    ) -> ResultantLoad:
-        """Return the largest resultant over a window of flight, jointly over both planes.
-
-        Parameters
-        ----------
-        resultant : str
-            Such as 'resultant_bending_moment' or 'total_angle_of_attack'.
-        window : (float, float), optional
-            s; the vehicle's default times without it.
-        probabilities : float or iterable of float
-            Each a probability with which the flight's largest resultant passes its level.
-        draws, seed : int
-            Number of paths, and the seed of the draws.
-
-        Returns
-        -------
-        ResultantLoad
-            ``level``, ``interval``, ``probability(level)``, ``passing(times, limit)``.
-
-        Raises
-        ------
-        PlanesError
-            The system has one plane.
-        UnknownNameError, TimeRangeError, ParameterValueError, NoVarianceError, IntegrationError
-        """
-        return resultant_load(self, resultant, window, probabilities, draws, seed)
 
     def resultant_along_vehicle(
         self, times: Iterable[float], load: str = "bending_moment", probability: float = LIKE_3_SIGMA

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     from ..flight_load.load import FlightLoad
     from ..flight_load.passage import Passage
+    from ..study import Study
 
 
 def flight_load(
@@ -30,7 +31,9 @@ def flight_load(
     window: Annotated[
         str | None, typer.Option(help="BEGIN:END of the flight in s; the vehicle's default times without it.")
     ] = None,
-    response: Annotated[list[str] | None, typer.Option(help="Response, several times; all without it.")] = None,
+    response: Annotated[
+        list[str] | None, typer.Option(help="Response or resultant of both planes, several times; all without it.")
+    ] = None,
     probability: Annotated[
         list[float] | None,
         typer.Option(parser=number, help="Chance with which the level is passed, several times; 0.00135 without it."),
@@ -53,13 +56,17 @@ def flight_load(
     changes: Changes = None,
     turbulence: Turbulence = None,
 ) -> None:
-    """The load of the whole flight: levels that its largest values pass, exceedance, limits and margins."""
+    """The load of the whole flight: levels that its largest values pass, exceedance, limits and margins.
+
+    Of a vehicle in both planes, resultants stand beside the responses of each plane; limits of a load along the vehicle
+    are then of its resultant.
+    """
     from ..flight_load.capability_figure import capability_figure
     from ..flight_load.exceedance_figure import exceedance_figure
     from ..flight_load.files import write_flight_loads, write_passage, write_sensitivities
     from ..flight_load.limit_table import Limits
     from ..flight_load.limits import checked_limits
-    from ..flight_load.load import DESIGN
+    from ..flight_load.load import DESIGN, checked_load
     from ..flight_load.margin_figure import margin_figure
     from ..flight_load.request import NoVarianceError, checked_draws
     from ..flight_load.uncertain_parameter import checked_spread
@@ -76,7 +83,7 @@ def flight_load(
     study = load_study(
         vehicle, changes, ["title", "default_times"] if window is None else ["title"], turbulence=turbulence
     )
-    names = study.checked_responses(response or None)
+    names = [checked_load(study, name) for name in dict.fromkeys(response)] if response else known_loads(study, chosen)
     flown = checked_window(study, flown)
     if limits is not None:
         checked_limits(study, limits, flown)
@@ -146,6 +153,14 @@ def parse_window(text: str) -> tuple[float, float]:
     return begin, end
 
 
+def known_loads(study: Study, sides: str = "both") -> list[str]:
+    """Return the responses that a flight's load is known of, and the resultants, which have no sides."""
+    from ..statistics.resultants import resultant_pairs
+
+    names = study.checked_responses(None)
+    return [*names, *resultant_pairs(names)] if sides == "both" else names
+
+
 def print_levels(loads: list[FlightLoad]) -> None:
     """Print the levels of flights beside those of their worst instants."""
     from ..present.style import display, words
@@ -164,7 +179,7 @@ def print_levels(loads: list[FlightLoad]) -> None:
             half = 0.5 * (found.interval[1] - found.interval[0])
             table.add_row(
                 words(load.response), f"{p:g}", f"{factor * found.value:.4g} {unit}",
-                side if share > ONE_SIDE else f"{side} {100 * share:.0f} %", f"{factor * half:.2g}",
+                f"{side} {100 * share:.0f} %" if share <= ONE_SIDE else side, f"{factor * half:.2g}",
                 f"{factor * instant:.4g} {unit}", f"{found.value / instant:.3f}",
             )  # fmt: skip
     print_table(table, console)
@@ -292,12 +307,13 @@ def print_passage(passage: Passage) -> None:
         table.add_column(column, justify="right", no_wrap=True)
     from ..present.style import display
 
-    margin, times, mean = passage.margin.values, passage.margin["time"].values, passage.process.drawn.mean
+    margin, times, mean = passage.margin.values, passage.margin["time"].values, passage.process.drawn.mean[passage.told]
     for r in sorted(range(chance.size), key=lambda r: -chance[r])[:SHOWN_LIMITS]:
         load, at = passage.loads[r], int(margin[:, r].argmin())
         factor, unit = display(load.unit, passage.limit[:, r])
         left = f"{factor * margin[at, r]:.3g} {unit}"
         side = passage.sides if passage.sides != "both" else "lower" if mean[at, r] < 0 else "upper"
+        side = "" if load.resultant else side
         table.add_row(str(load), f"{chance[r]:.3g}", left, side, f"{times[at]:.4g} s")
     print_table(table, console)
     console.print(

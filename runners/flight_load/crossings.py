@@ -169,20 +169,33 @@ def sightings(count: int, steps: Steps, boundary: Boundary, grid: Grid, every: i
     at = slice(None, None, every)
     seen, times, mean, diffusion = boundary.at(at), grid.times[at], grid.mean[at], grid.diffusion[at]
     variance = 0.5 * (diffusion[1:] ** 2 + diffusion[:-1] ** 2) * np.diff(times)[:, None]
-    reach = np.sqrt(-0.5 * NEVER * variance)[steps.step]  # how near an end lies at least to where a bridge counts
-    begin, end = mean[steps.step] + steps.begin, mean[steps.step + 1] + steps.end
+    moved = Steps(steps.path, steps.step, mean[steps.step] + steps.begin, mean[steps.step + 1] + steps.end)
+    return sighted(count, moved, seen, variance[steps.step], (diffusion[1:] < 0)[steps.step])
+
+
+def sighted(
+    count: int, steps: Steps, seen: Boundary, variance: NDArray[np.float64], turned: NDArray[np.bool_]
+) -> Sightings:
+    """Return those of some steps that come near a boundary.
+
+    Parameters
+    ----------
+    count : int
+        Paths.
+    steps : Steps
+        With values, not deviations, at their ends.
+    seen : Boundary
+        At the points that steps are between.
+    variance : (k, r) array
+        Of the bridge of each step.
+    turned : (k, r) array of bool
+        Whether white noise moves the output the other way.
+    """
+    reach = np.sqrt(-0.5 * NEVER * variance)  # how near an end lies at least to where a bridge counts
+    begin, end = steps.begin, steps.end
     near = _near(steps, begin, end, seen.upper, reach) | _near(steps, -begin, -end, -seen.lower, reach)
     kept = np.flatnonzero(_any(near))
-    begin, end, step = begin[kept], end[kept], steps.step[kept]
-    return Sightings(
-        count,
-        steps.path[kept],
-        step,
-        begin,
-        end,
-        variance[step],
-        (diffusion[1:] < 0)[step],
-    )
+    return Sightings(count, steps.path[kept], steps.step[kept], begin[kept], end[kept], variance[kept], turned[kept])
 
 
 def _near(

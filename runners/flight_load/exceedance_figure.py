@@ -7,8 +7,8 @@ from matplotlib import rc_context
 from matplotlib.figure import Figure
 
 from ..present.style import COLORS, STYLE, display, words, wrapped
-from ..statistics.percentiles import instant_level
 from .load import FlightLoad
+from .sampling import instant_levels
 
 MAXIMUM = "#c8442c"
 
@@ -27,10 +27,10 @@ def exceedance_figure(load: FlightLoad, title: str) -> Figure:
     """
     curve, density = load.exceedance, load.time_of_maximum
     factor, unit = display(load.unit, curve["level"].values)
-    size = {"both": "|{}|", "upper": "{}", "lower": "-{}"}[load.sides].format(words(load.response))
-    moments = load.process.drawn.mean, load.process.std
-    chances = np.geomspace(0.5, 1e-7, 80)
-    instants = [float(instant_level(*moments, p, load.sides).max()) for p in chances]
+    size = {"both": "|{}|", "upper": "{}", "lower": "-{}"}[load.sides]
+    size = ("{}" if load.of.is_resultant else size).format(words(load.response))
+    chances = np.geomspace(0.5, 1e-7, 24 if load.of.is_resultant else 80)
+    instants = [float(instant_levels(load.process, p, load.sides).max()) for p in chances]
     with rc_context(STYLE):
         figure = Figure(figsize=(8.0, 7.2), layout="constrained")
         above, below = figure.subplots(2, height_ratios=(3, 2))
@@ -46,7 +46,7 @@ def exceedance_figure(load: FlightLoad, title: str) -> Figure:
         width = float(density["time"][1] - density["time"][0])
         below.step(density["time"], density[0], where="mid", color=COLORS["mean"], label="any flight")
         name = f"flights that pass {factor * float(load.level[0]):.4g} {unit}"
-        if load.sides == "both":
+        if load.sides == "both" and not load.of.is_resultant:
             name += f", {100 * float(load.side_shares[0].max()):.3g} % on the {load.side[0]} side"
         below.fill_between(density["time"], density[1], step="mid", color=MAXIMUM, alpha=0.35, lw=0, label=name)
         below.set(

@@ -142,10 +142,11 @@ def write_passage(passage: Passage, folder: Path) -> list[Path]:
     whole = with_conventions(one_unit_a_variable(whole, {"load": [load.unit for load in passage.loads]}, words={}))
     rows: list[Sequence[object]] = [("load", "unit", "station_m", "time_s", "limit", "level", "margin")]
     values = [found[name].values for name in ("limit", "level", "margin")]
+    every = max(1, CSV_EVERY // passage.told.step)
     for r, load in enumerate(passage.loads):
         station = "" if np.isnan(load.station) else f"{load.station:.9g}"
-        for k, time in enumerate(found["time"].values[::CSV_EVERY]):
-            numbers = (f"{part[k * CSV_EVERY, r]:.9e}" for part in values)
+        for k, time in enumerate(found["time"].values[::every]):
+            numbers = (f"{part[k * every, r]:.9e}" for part in values)
             rows.append((load.name, load.unit, station, f"{time:.12g}", *numbers))
     text = _csv(rows)
     return [
@@ -166,7 +167,7 @@ def _levels_csv(loads: Sequence[FlightLoad]) -> str:
         by_wind = load.wind_interval().values if known else []
         for k, (p, found) in enumerate(zip(load.probabilities, load.levels, strict=True)):
             numbers = found.value, *found.interval, found.probability.spacing_error, float(load.instant_level[k])
-            share = f"{float(load.side_shares[k].max()):.6g}"
+            share = f"{float(load.side_shares[k].max()):.6g}" if load.side[k] else ""
             wind = [f"{x:.9e}" for x in by_wind[k]] + [f"{load.wind_samples:g}"] if known else [""] * 3
             rows.append(
                 (load.response, load.unit, load.sides, *load.window, f"{p:g}", *(f"{x:.9e}" for x in numbers),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 
@@ -10,19 +11,47 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...model.errors import DataErrorCollector, suggestion
+from ...model.vehicle.loads import BENDING_MOMENT, SHEAR_FORCE
+from ...model.vehicle.planes import Plane, flown_planes
 from ..case.case import Case
 from ..solvers.markov_chain import MarkovChain
 from ..station_loads.loads_along_vehicle import LOADS, SAME_STATION, load_rows, vehicle_stations
 from ..statistics.percentiles import Sides, checked_probabilities, checked_sides
+from ..statistics.resultants import resultant_name, resultant_pairs
 from .limit_table import LimitError, Limits, limit_table
+from .norms import Norms
 from .passage import LimitedLoad, Passage
 from .process import ManyOutputs
 from .request import UncheckedStationsWarning, checked_draws, refuse_without_variance
+from .response import STEPS, ResponseInWindow
 from .window import checked_window, window_chain
 
-STEPS = 2400  # of the window; AS-504 in 60 s: 0.025 s
 
-Rows = tuple[list[LimitedLoad], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
+@dataclass(frozen=True, eq=False)
+class LimitedRows:
+    """Loads of one column of limits in terms of the states.
+
+    Attributes
+    ----------
+    loads : list of LimitedLoad
+        s of them.
+    row : (m, s, p, n) array
+        p is one for a response and two for a resultant.
+    mean : (m, s, p) array
+    limit : (m, s) array
+    """
+
+    loads: list[LimitedLoad]
+    row: NDArray[np.float64]
+    mean: NDArray[np.float64]
+    limit: NDArray[np.float64]
+
+    def flat(self, parts: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return rows (m, s * parts, n) and means (m, s * parts); a response beside resultants is one with nothing."""
+        m, s, p, n = self.row.shape
+        row, mean = np.zeros((m, s, parts, n)), np.zeros((m, s, parts))
+        row[:, :, :p], mean[:, :, :p] = self.row, self.mean
+        return row.reshape(m, s * parts, n), mean.reshape(m, s * parts)
 
 
 def limit_passage(
@@ -40,12 +69,17 @@ def limit_passage(
     chosen, flown = checked_sides(sides), checked_window(case, window)
     table = checked_limits(case, limits, flown)
     states = window_chain(case, flown, STEPS)
-    rows_of = _output_row if table.station is None else _station_rows
-    loads, rows, means, given = zip(*(rows_of(case, table, states, name) for name in table.values), strict=True)
-    process = ManyOutputs(states, np.concatenate(rows, axis=1), np.concatenate(means, axis=1))
+    rows_of = _response_rows if table.station is None else _station_rows
+    found = [rows_of(case, table, states, name) for name in table.values]
+    parts = max(each.row.shape[2] for each in found)
+    rows, means = (np.concatenate(arrays, axis=1) for arrays in zip(*(f.flat(parts) for f in found), strict=True))
+    if parts == 2 and chosen != "both":
+        raise LimitError(f"limits a resultant, which has no {chosen} side; ask for both sides", file=table.file)
+    process = Norms.many(states, rows, means) if parts == 2 else ManyOutputs(states, rows, means)
     refuse_without_variance(" and ".join(table.values), process)
-    limit = np.concatenate(given, axis=1)
-    return Passage(case, tuple(chain.from_iterable(loads)), process, limit, chosen, design, draws, seed)
+    limit = np.concatenate([each.limit for each in found], axis=1)
+    loads = tuple(chain.from_iterable(each.loads for each in found))
+    return Passage(case, loads, process, limit, chosen, design, draws, seed)
 
 
 def checked_limits(case: Case, limits: str | Path | Limits, window: tuple[float, float]) -> Limits:
@@ -63,7 +97,8 @@ def checked_limits(case: Case, limits: str | Path | Limits, window: tuple[float,
     DataError, TimeRangeError, DirectNoiseError
     """
     table = limit_table(limits)
-    known = list(case.system.output_names) if table.station is None else list(LOADS)
+    pairs = resultant_pairs(case.system.output_names)
+    known = [*case.system.output_names, *pairs] if table.station is None else _loads_along(case)
     what = "response" if table.station is None else "load along the vehicle"
     collector = DataErrorCollector()
     for name in table.values:
@@ -77,8 +112,19 @@ def checked_limits(case: Case, limits: str | Path | Limits, window: tuple[float,
                 _inside(case, table, name)
     collector.raise_all()
     if table.station is None:
-        case.checked_responses(table.values)
+        case.checked_responses([output for name in table.values for output in pairs.get(name, (name,))])
     return table
+
+
+def _planes(case: Case) -> tuple[Plane | None, ...]:
+    """Return both planes of a vehicle that flies in both, of any other none in particular."""
+    planes = flown_planes(case.vehicle_for("a load along the vehicle"))
+    return (None,) if len(planes) == 1 else planes
+
+
+def _loads_along(case: Case) -> list[str]:
+    """Return the loads along a vehicle that can be limited: of both planes those across the axis, as resultants."""
+    return list(LOADS) if len(_planes(case)) == 1 else [BENDING_MOMENT, SHEAR_FORCE]
 
 
 def _inside(case: Case, table: Limits, name: str) -> NDArray[np.bool_]:
@@ -97,19 +143,21 @@ def _inside(case: Case, table: Limits, name: str) -> NDArray[np.bool_]:
 
 
 def _unit(case: Case, table: Limits, name: str) -> str:
-    return LOADS[name] if table.station is not None else case.system.outputs[case.system.output_index(name)].unit
+    return LOADS[name] if table.station is not None else ResponseInWindow(case, name, (0.0, 0.0), 0).unit
 
 
-def _output_row(case: Case, table: Limits, states: MarkovChain, name: str) -> Rows:
-    """Return a response: what it is, its row (m, 1, n), its mean and its limit (m, 1)."""
-    which, unit = case.system.output_index(name), _unit(case, table, name)
-    limit = table.of(name, unit, states.times)
-    return [LimitedLoad(name, unit)], states.output[:, [which]], states.mean[:, [which]], limit
+def _response_rows(case: Case, table: Limits, states: MarkovChain, name: str) -> LimitedRows:
+    """Return a response, or the resultant of two, with its limit."""
+    of = ResponseInWindow(case, name, (0.0, 0.0), 0)
+    row, mean = states.output[:, None, of.rows], states.mean[:, None, of.rows]
+    limit = table.of(name, of.unit, states.times)
+    return LimitedRows([LimitedLoad(name, of.unit, resultant=of.is_resultant)], row, mean, limit)
 
 
-def _station_rows(case: Case, table: Limits, states: MarkovChain, name: str) -> Rows:
-    """Return a load at the vehicle's stations within those of the table: rows (m, s, n), means and limits (m, s)."""
-    found = load_rows(case, states.times.tolist(), load=name)
+def _station_rows(case: Case, table: Limits, states: MarkovChain, name: str) -> LimitedRows:
+    """Return a load at the vehicle's stations within those of the table; of two planes its resultant."""
+    planes = _planes(case)
+    found = [load_rows(case, states.times.tolist(), load=name, plane=plane) for plane in planes]
     limit, stations = table.of(name, LOADS[name], states.times), table.station
     assert stations is not None
     inside = _inside(case, table, name)
@@ -119,8 +167,11 @@ def _station_rows(case: Case, table: Limits, states: MarkovChain, name: str) -> 
             f"{int((~inside).sum())} of the vehicle's {inside.size} stations lie outside and are not looked at"
         )
         warnings.warn(UncheckedStationsWarning(text), stacklevel=4)
-    at = np.flatnonzero(inside)
-    mean = np.einsum("msn,mn->ms", found.state[:, at], case.mean_states(states.times)) + found.direct_mean[:, at]
-    own = np.stack([np.interp(found.station[at], stations, row) for row in limit])
-    loads = [LimitedLoad(name, LOADS[name], float(s)) for s in found.station[at]]
-    return loads, found.state[:, at], mean, own
+    at, means = np.flatnonzero(inside), case.mean_states(states.times)
+    row = np.stack([plane.state[:, at] for plane in found], axis=2)
+    mean = np.einsum("mspn,mn->msp", row, means) + np.stack([plane.direct_mean[:, at] for plane in found], axis=2)
+    station, resultant = found[0].station[at], len(planes) == 2
+    own = np.stack([np.interp(station, stations, values) for values in limit])
+    called = resultant_name(name) if resultant else name
+    loads = [LimitedLoad(called, LOADS[name], float(s), resultant) for s in station]
+    return LimitedRows(loads, row, mean, own)

@@ -1,4 +1,4 @@
-"""The load of a whole flight: the largest value of one response in a window, with its probability."""
+"""The load of a whole flight: the largest value of a response or resultant in a window, with its probability."""
 
 from __future__ import annotations
 
@@ -10,36 +10,37 @@ from pathlib import Path
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 from scipy.special import ndtri_exp
 
-from ...model.errors import ParameterValueError
+from ...model.errors import ParameterValueError, PlanesError, UnknownNameError
 from ..case.case import Case
 from ..case.provenance import provenance, wind_samples
 from ..statistics.percentiles import (
     Sides,
     checked_probabilities,
     checked_sides,
-    instant_level,
     monte_carlo_runs,
 )
+from ..statistics.resultants import resultant_name, resultant_pairs
 from ..statistics.sampling_interval import checked_samples
-from .crossings import Boundary, sightings
+from .crossings import Boundary
 from .limit_table import LimitError, Limits, limits_over_time
+from .norms import Norms, Process
 from .passage import LimitedLoad, Passage
-from .pathwise import Movement, movement
+from .pathwise import Movement, Reaching, movement, reaching
 from .probability import Estimate, Level, estimate, find_level
-from .process import OneOutput
+from .process import ManyOutputs
 from .request import SpacingWarning, checked_draws, checked_level, refuse_without_variance
-from .response import ResponseInWindow
-from .sampling import draw_beyond
+from .response import STEPS, ResponseInWindow, squared_diffusion
+from .sampling import draw_beyond, instant_levels, sighted_steps, steps_near
 from .sensitivity import level_sensitivity
 from .uncertain_parameter import checked_spread, processes_of, uncertain_level
 from .upcrossings import upcrossing_rate
-from .wind_interval import wind_intervals
+from .wind_interval import wind_interval_of
 from .window import checked_window
 
 DESIGN = 0.00135  # 1 - Phi(3): with this chance an instant passes mean + 3 sigma
-STEPS = 2400  # of the window at first; AS-504 in 60 s: 0.025 s
 MOST_STEPS = 9600
 SPACING_ERROR = 0.02  # relative, of a probability; finer where it is larger
 DRAWS = 2000
@@ -52,16 +53,16 @@ RUNS = "simulated flights without a failure that would say as much, at a consume
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FlightLoad:
-    """The largest value of a response over a window of flight.
+    """The largest value of a response, or of the resultant of two planes, over a window of flight.
 
     Attributes
     ----------
     of : ResponseInWindow
-        The case, the response and the window.
+        The case, the response or resultant and the window.
     probabilities : tuple of float
         For which levels were asked.
     sides : {'both', 'upper', 'lower'}
-        Whether the maximum is of the size of the response, of the response, or of its negative.
+        Whether the maximum is of the size of the response, of the response, or of its negative; a resultant is a size.
     draws, seed : int
         Paths drawn, and the seed of the draws.
     limits : Limits or None
@@ -91,9 +92,19 @@ class FlightLoad:
         return self.of.window
 
     @cached_property
-    def process(self) -> OneOutput:
-        """The response as a Gaussian process over the window."""
+    def process(self) -> Process:
+        """The response as a Gaussian process over the window, or the norm of two."""
         return self.of.process()
+
+    @cached_property
+    def parts(self) -> tuple[ResponseInWindow, ...]:
+        """Where flights pass the level of each probability: of a resultant a part of the window."""
+        return tuple(self.of.near(p) for p in self.probabilities)
+
+    @cached_property
+    def processes(self) -> tuple[Process, ...]:
+        """The response as a process there, one a probability."""
+        return tuple(part.process() if part.is_resultant else self.process for part in self.parts)
 
     def _boundary(self, value: float) -> Boundary:
         return Boundary.around(np.full(self.process.seen.mean.shape, value), self.sides)
@@ -104,11 +115,16 @@ class FlightLoad:
     @cached_property
     def levels(self) -> tuple[Level, ...]:
         """What is found for every probability: level, interval, estimate, paths."""
-        return tuple(self._level(self.process, p, self.draws) for p in self.probabilities)
+        found = zip(self.processes, self.probabilities, strict=True)
+        return tuple(self._level(process, p, self.draws) for process, p in found)
 
-    def _level(self, process: OneOutput, probability: float, draws: int) -> Level:
-        size = float((np.abs(process.drawn.mean) + process.std).max())
-        return find_level(process, probability, self._boundary, size, self._random(0), draws)
+    def _level(self, process: Process, probability: float, draws: int) -> Level:
+        size, shape = float((np.abs(process.drawn.mean) + process.std).max()), process.seen.mean.shape
+
+        def boundary(value: float) -> Boundary:
+            return Boundary.around(np.full(shape, value), self.sides)
+
+        return find_level(process, probability, boundary, size, self._random(0), draws)
 
     @cached_property
     def level(self) -> xr.DataArray:
@@ -118,8 +134,8 @@ class FlightLoad:
     @cached_property
     def instant_level(self) -> xr.DataArray:
         """The level that the worst single instant passes with each probability, (probability,); the lower one."""
-        moments = self.process.drawn.mean, self.process.std
-        values = [float(instant_level(*moments, p, self.sides).max()) for p in self.probabilities]
+        pairs = zip(self.processes, self.probabilities, strict=True)
+        values = [float(instant_levels(process, p, self.sides).max()) for process, p in pairs]
         return self._array(values, "level that the worst instant passes")
 
     @cached_property
@@ -129,15 +145,22 @@ class FlightLoad:
 
     @cached_property
     def side_shares(self) -> xr.DataArray:
-        """How the flights that pass each level fall on the two sides, (probability, side); they add up to one."""
+        """How the flights that pass each level fall on the two sides, (probability, side); they add up to one.
+
+        NaN for a resultant, which has no sides.
+        """
         found = np.array([level.draws.places(level.boundary).sum(axis=(0, 1)) for level in self.levels])
         name = "share of the passing flights"
+        if self.of.is_resultant:
+            found = np.full(found.shape, np.nan)
         whole = self._array(found / found.sum(axis=1, keepdims=True), name, ("side",), "1")
         return whole.assign_coords(side=list(SIDES))
 
     @property
     def side(self) -> list[str]:
-        """The side on which flights pass each level more often, 'upper' or 'lower', one a probability."""
+        """The side on which flights pass each level more often, 'upper' or 'lower', '' where none."""
+        if self.of.is_resultant:
+            return [""] * len(self.probabilities)
         return [SIDES[k] for k in self.side_shares.values.argmax(axis=1)]
 
     @property
@@ -180,7 +203,10 @@ class FlightLoad:
         model's, nor the sampling of the paths (``interval``).
         """
         number = checked_samples(samples, self.wind_samples)
-        found = wind_intervals(self.of, self.process, self.levels, number, confidence)
+        found = [
+            wind_interval_of(self.parts[k], level, lambda k=k: self._reaching(k, 7, self.draws), number, confidence)
+            for k, level in enumerate(self.levels)
+        ]
         name = f"{100 * confidence:g} % interval by {number:g} independent soundings of the wind"
         return self._array(found, name, ("bound",)).assign_attrs(independent_samples=number, confidence=confidence)
 
@@ -217,11 +243,11 @@ class FlightLoad:
                 )
             spread = float(1 / np.sqrt(2 * (checked_samples(None, self.wind_samples) - 1)))
         asked = checked_spread(spread)
-        processes, draws = processes_of(self.of, parameter, asked), max(200, self.draws // 4)
-        found = [
-            uncertain_level(processes, level, p, self.sides, self._random(6, k), draws)
-            for k, (p, level) in enumerate(zip(self.probabilities, self.levels, strict=True))
-        ]
+        draws, found, made = max(200, self.draws // 4), [], {}
+        for k, (p, level, part) in enumerate(zip(self.probabilities, self.levels, self.parts, strict=True)):
+            place = part.window, part.steps
+            made[place] = made.get(place) or processes_of(part, parameter, asked)
+            found.append(uncertain_level(made[place], level, p, self.sides, self._random(6, k), draws))
         name = f"level that flights pass with {parameter} uncertain by {100 * asked:.3g} %"
         return self._array([value for value, _ in found], name).assign_attrs(
             parameter=parameter, spread=asked, standard_error=[error for _, error in found]
@@ -302,6 +328,7 @@ class FlightLoad:
         ------
         ParameterValueError
             The level is no finite number.
+            Or the response is a resultant.
         NotDifferentiableError
             White noise reaches the rate of the response, whose variance is infinite.
         """
@@ -339,7 +366,7 @@ class FlightLoad:
         if self.limits is None:
             raise LimitError(f"no limit of '{self.response}' was given; ask with limit=...")
         limit, own = self.limits.of(self.response, self.unit, self.process.seen.times), self.probabilities[0]
-        loads = (LimitedLoad(self.response, self.unit),)
+        loads = (LimitedLoad(self.response, self.unit, resultant=self.of.is_resultant),)
         return Passage(self.of.case, loads, self.process, limit, self.sides, own, self.draws, self.seed)
 
     @cached_property
@@ -347,8 +374,9 @@ class FlightLoad:
         """Probability of passing each level from about 0.5 down to 1e-7, (level,), with ``standard_error``."""
         begin, end = (self._instant_level(np.log(p)) for p in (0.5, 1e-8))
         values, found, errors = np.linspace(begin, end, 36), [], []
+        count = self.draws // (2 if self.of.is_resultant else 4)  # those of circles weigh less alike
         for number, group in enumerate(np.split(values, 12)):
-            draws = draw_beyond(self.process, self._boundary(group[0]), self._random(2, number), self.draws // 4)
+            draws = draw_beyond(self.process, self._boundary(group[0]), self._random(2, number), count)
             for value in group:
                 each = draws.contributions(self._boundary(value))
                 found.append(min(float(each.mean()), 1.0))
@@ -361,7 +389,9 @@ class FlightLoad:
         )
 
     def _instant_level(self, log_probability: float) -> float:
-        """Return the level that the worst instant passes with a probability."""
+        """Return the level that the worst instant passes with a probability, or a little less."""
+        if isinstance(self.process, Norms):
+            return float(instant_levels(self.process, float(np.exp(log_probability)), self.sides).max())
         mean, away = self.process.drawn.mean, -ndtri_exp(log_probability) * self.process.std
         sides = {"upper": mean + away, "lower": away - mean}
         return max(float(side.max()) for name, side in sides.items() if self.sides in (name, "both"))
@@ -374,17 +404,15 @@ class FlightLoad:
         """
         edges, times = np.linspace(*self.window, BINS + 1), self.process.seen.times
         random = self._random(3)
-        drawn = self.process.deviations(random, self.draws)
-        size = {"both": np.abs, "upper": np.asarray, "lower": np.negative}[self.sides](self.process.drawn.mean + drawn)
+        drawn, size = self._drawn(random)
         near = (size > size.max(axis=1, keepdims=True) - 2 * self.process.between).any(axis=2)
-        steps, _ = self.process.steps_near(drawn, near, random)
-        _, points, *_ = sightings(self.draws, steps, self._boundary(-np.inf), self.process.seen).worst(
-            self._boundary(0.0)
-        )
+        steps, _ = steps_near(self.process, drawn, near, random)
+        seen = sighted_steps(self.process, self.draws, steps, self._boundary(-np.inf))
+        _, points, *_ = seen.worst(self._boundary(0.0))
         rows = [np.histogram(times[points], edges, density=True)[0]]
         for found in self.levels:
             weight = found.draws.places(found.boundary).sum(axis=(1, 2))
-            rows.append(np.histogram(times, edges, weights=weight, density=True)[0])
+            rows.append(np.histogram(found.draws.process.seen.times, edges, weights=weight, density=True)[0])
         return xr.DataArray(
             np.array(rows),
             {
@@ -395,6 +423,27 @@ class FlightLoad:
             "time_of_maximum",
             {"units": "s^-1", "long_name": "probability density of the time of the maximum"},
         )
+
+    def _drawn(self, random: np.random.Generator) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return drawn deviations, and the sizes of what they make, on the grid drawn."""
+        process = self.process
+        if isinstance(process, Norms):
+            drawn = process.of.deviations(random, self.draws)
+            return drawn, process.sizes(drawn)
+        drawn = process.deviations(random, self.draws)
+        return drawn, {"both": np.abs, "upper": np.asarray, "lower": np.negative}[self.sides](
+            process.drawn.mean + drawn
+        )
+
+    def _reaching(self, which: int, stream: int, draws: int) -> Reaching:
+        process = self.processes[which]
+        assert not isinstance(process, ManyOutputs)
+        return reaching(process, self.levels[which], self._random(stream, which), draws)
+
+    def _movement(self, which: int, stream: int, draws: int) -> Movement:
+        part, paths = self.parts[which], self._reaching(which, stream, draws)
+        diffusion = squared_diffusion(part.chain, part.chain.output[:, part.rows])
+        return movement(paths, diffusion[:: paths.outputs.stride])
 
     def movement(self, which: int) -> Movement:
         """Return how a level moves with mean and covariance of the response.
@@ -408,7 +457,7 @@ class FlightLoad:
         -------
         Movement
         """
-        return movement(self.process, self.levels[which], self._random(4, which), MOVED)
+        return self._movement(which, 4, MOVED)
 
     def sensitivity(self, probability: float | None = None, parameters: Iterable[str] | None = None) -> xr.Dataset:
         """Return derivatives of a level by parameters.
@@ -431,7 +480,8 @@ class FlightLoad:
         ParameterValueError, UnknownNameError, StructuralParameterError
         """
         which = self.number_of(probability)
-        found = level_sensitivity(self.of, self.levels[which], self.movement(which), parameters)
+        paths = self._reaching(which, 4, MOVED) if self.of.is_resultant else None
+        found = level_sensitivity(self.parts[which], self.levels[which], self.movement(which), paths, parameters)
         return found.assign_attrs(probability=self.probabilities[which], sides=self.sides)
 
     @cached_property
@@ -443,19 +493,21 @@ class FlightLoad:
         """
         system, share, without = self.of.case.system, [], []
         count = len(system.sources)
-        alone = [self.of.process([k]) for k in range(count)]
         for which in range(len(self.probabilities)):
-            moved = movement(self.process, self.levels[which], self._random(5, which), 2 * self.draws)
+            moved = self._movement(which, 5, 2 * self.draws)
             still = np.zeros_like(moved.mean)
-            part = np.array([moved.change(still, one.covariance, one.drawn.diffusion[:, 0] ** 2) for one in alone])
+            part = np.array([moved.change(still, *self.parts[which].share_of([k])) for k in range(count)])
             share.append(part / part.sum())
         size_of = {"both": np.abs, "upper": np.asarray, "lower": np.negative}[self.sides]
         for number in range(count):
-            process = self.of.process([k for k in range(count) if k != number])
-            if float(process.std.max()) > 0:
-                without.append([self._level(process, p, self.draws // 4).value for p in self.probabilities])
-            else:
-                without.append([float(size_of(process.seen.mean).max())] * len(self.probabilities))
+            others = [k for k in range(count) if k != number]
+            levels = []
+            for part, p in zip(self.parts, self.probabilities, strict=True):
+                process = part.process(others)
+                varies = float(process.std.max()) > 0
+                still = float(size_of(process.seen.mean).max())
+                levels.append(self._level(process, p, self.draws // 4).value if varies else still)
+            without.append(levels)
         dims, unit = ("probability", "source"), self.unit
         return xr.Dataset(
             {
@@ -520,6 +572,26 @@ class FlightLoad:
         return xr.DataArray(np.array(list(values)), coords, ("probability", *more), attrs=attributes)
 
 
+def checked_load(case: Case, name: str) -> str:
+    """Return the name of a response or a resultant.
+
+    Raises
+    ------
+    UnknownNameError, DirectNoiseError
+    PlanesError
+        It is the resultant of a response of one plane.
+    """
+    pairs = resultant_pairs(case.system.output_names)
+    if name in pairs:
+        case.checked_responses(pairs[name])
+        return name
+    if name in {resultant_name(output) for output in case.system.output_names}:
+        raise PlanesError.of_one(f"'{name}'", case.system.name)
+    if pairs and name not in case.system.output_names:
+        raise UnknownNameError("response or resultant", str(name), [*case.system.output_names, *pairs])
+    return case.checked_responses([name])[0]
+
+
 def flight_load(
     case: Case,
     response: str,
@@ -531,14 +603,17 @@ def flight_load(
     limit: str | Path | Limits | float | None = None,
 ) -> FlightLoad:
     """See :meth:`Study.flight_load`."""
-    (name,) = case.checked_responses([response])
+    name, sided = checked_load(case, response), checked_sides(sides)
     checked_draws(draws, seed)
     asked = checked_probabilities(probabilities)
     flown = checked_window(case, window)
     asked_of = ResponseInWindow(case, name, flown, STEPS)
-    limits = None if limit is None else limits_over_time(limit, name, asked_of.unit, flown)
-    load = FlightLoad(asked_of, asked, checked_sides(sides), draws, seed, limits)
-    refuse_without_variance(name, load.process)
+    unit = asked_of.unit
+    limits = None if limit is None else limits_over_time(limit, name, unit, flown)
+    if asked_of.is_resultant and sided != "both":
+        raise ParameterValueError(f"'{name}' is a resultant, which has no {sided} side; ask with sides='both'")
+    load = FlightLoad(asked_of, asked, sided, draws, seed, limits)
+    refuse_without_variance(name, load.processes[0])
     while (missed := load.spacing_missed) > SPACING_ERROR and load.of.steps < MOST_STEPS:
         load = replace(load, of=replace(load.of, steps=2 * load.of.steps))
     if missed > SPACING_ERROR:

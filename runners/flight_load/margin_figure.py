@@ -7,7 +7,6 @@ from matplotlib import rc_context
 from matplotlib.figure import Figure
 
 from ..present.style import COLORS, STYLE, display, words, wrapped
-from ..statistics.percentiles import instant_level
 from .load import FlightLoad
 
 
@@ -25,9 +24,8 @@ def margin_figure(load: FlightLoad, title: str) -> Figure:
     matplotlib.figure.Figure
     """
     passage, process = load.passage, load.process
-    times, mean, std = process.drawn.times, process.drawn.mean[:, 0], process.std[:, 0]
-    limit = passage.limit[:: process.stride, 0]
-    level = instant_level(mean, std, passage.design, load.sides)
+    times, mean = process.drawn.times[passage.told], process.drawn.mean[passage.told, 0]
+    limit, level = passage.limit_told[:, 0], passage.level.values[:, 0]
     factor, unit = display(load.unit, [limit.max()])
     size = np.abs(mean) if load.sides == "both" else mean if load.sides == "upper" else -mean
     with rc_context(STYLE):
@@ -39,7 +37,8 @@ def margin_figure(load: FlightLoad, title: str) -> Figure:
         axes.plot(times, factor * level, color=COLORS["combined"], lw=2,
                   label=f"passed with {passage.design:g} at each instant")  # fmt: skip
         axes.fill_between(times, factor * level, factor * limit, where=limit > level, color="#3a923a", alpha=0.12, lw=0)
-        axes.plot(times, factor * size, color=COLORS["mean"], lw=1.6, label="mean")
+        label = "of the means alone" if load.of.is_resultant else "mean"
+        axes.plot(times, factor * size, color=COLORS["mean"], lw=1.6, label=label)
         axes.set(xlabel="flight time (s)", ylabel=f"{words(load.response)} ({unit})", xlim=load.window)
         axes.set_ylim(min(0.0, axes.get_ylim()[0]), None)
         axes.set_title(wrapped(f"{title}\nlimit passed by {passage.probability.value:.2g} of flights"))

@@ -13,14 +13,15 @@ from numpy.typing import NDArray
 
 from ..case.case import Case
 from ..case.provenance import provenance
-from ..statistics.percentiles import Sides, instant_level
+from ..statistics.percentiles import Sides
 from .crossings import Boundary
+from .norms import Norms, Process
 from .probability import Estimate, Level, estimate, find_level
-from .process import Process
 from .request import CertainPassageWarning
-from .sampling import Draws, draw_beyond
+from .sampling import Draws, draw_beyond, instant_levels
 
 BINS = 60  # of the time of passing
+MOST_TOLD = 4000  # levels of resultants, about
 
 
 @dataclass(frozen=True)
@@ -34,11 +35,14 @@ class LimitedLoad:
     unit : str
     station : float
         m; NaN for a response.
+    resultant : bool
+        Whether it is the norm of both planes.
     """
 
     name: str
     unit: str
     station: float = float("nan")
+    resultant: bool = False
 
     @property
     def label(self) -> str:
@@ -120,16 +124,27 @@ class Passage:
         what = {"units": "s^-1", "long_name": "probability density of passing, by the time farthest beyond"}
         return xr.DataArray(density, {"passage_time": time}, ("passage_time",), "passage_density", what)
 
+    @property
+    def told(self) -> slice:
+        """The points drawn at which levels and margins are told: not all of many resultants, whose levels are dear."""
+        mean = self.process.drawn.mean
+        return slice(None, None, max(1, mean.size // MOST_TOLD) if isinstance(self.process, Norms) else 1)
+
+    @property
+    def limit_told(self) -> NDArray[np.float64]:
+        """The limit at these points, (k, r)."""
+        return self.limit[:: self.process.stride][self.told]
+
     @cached_property
     def level(self) -> xr.DataArray:
         """The level that each load passes at each instant with the design probability, (time, load), SI."""
-        values = instant_level(self.process.drawn.mean, self.process.std, self.design, self.sides)
+        values = instant_levels(self.process, self.design, self.sides, self.told)
         return self._over_time(values, "level", f"passed at the instant with probability {self.design:g}")
 
     @cached_property
     def margin(self) -> xr.DataArray:
         """Limit minus that level, (time, load), SI."""
-        values = self.limit[:: self.process.stride] - self.level.values
+        values = self.limit_told - self.level.values
         return self._over_time(values, "margin", f"limit minus the level passed with probability {self.design:g}")
 
     @cached_property
@@ -159,7 +174,7 @@ class Passage:
             passing any, its ``standard_error`` and ``spacing_error``, the bounds, ``margin_of_safety``.
         """
         p = self.probability
-        limit = self._over_time(self.limit[:: self.process.stride], "limit", "limit of the size")
+        limit = self._over_time(self.limit_told, "limit", "limit of the size")
         parts = {"limit": limit, "level": self.level, "margin": self.margin}
         found = xr.Dataset(parts | {"passage_probability": self.by_load, "passage_density": self.by_time})
         return found.assign_attrs(
@@ -195,5 +210,5 @@ class Passage:
         }
 
     def _over_time(self, values: NDArray[np.float64], name: str, meaning: str) -> xr.DataArray:
-        time = ("time", self.process.drawn.times, {"units": "s", "long_name": "flight time"})
+        time = ("time", self.process.drawn.times[self.told], {"units": "s", "long_name": "flight time"})
         return xr.DataArray(values, {"time": time} | self._loads(), ("time", "load"), name, {"long_name": meaning})

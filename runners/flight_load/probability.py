@@ -9,8 +9,8 @@ import numpy as np
 from scipy.optimize import brentq
 
 from .crossings import Boundary
-from .process import Process
-from .sampling import Draws, draw_beyond, instant_probabilities
+from .norms import Process
+from .sampling import Draws, draw_beyond, instant_probabilities, largest_instant
 
 CONFIDENCE = 1.96  # standard errors of a 95 % interval
 ROUGH = 400  # draws that find about where a level lies
@@ -126,7 +126,7 @@ def find_level(
 
     def instant(u: float) -> float:
         at = boundary_of(u).at(slice(None, None, process.stride))
-        return float(instant_probabilities(process, at).max()) - np.log(probability)
+        return largest_instant(process, at) - np.log(probability)
 
     low, high = -size, 2 * size
     while instant(low) < 0:

@@ -1,6 +1,6 @@
 """Outputs over a window of flight as a Gaussian process on a grid, from which paths are drawn.
 
-Two forms of the same: one output by its covariance between all times, of which one factor gives any number of paths;
+Two forms of the same: few outputs by their covariance between all times, of which one factor gives any number of paths;
 many outputs, such as the loads of all stations, by the states, which are few, and never by a matrix of stations and
 times.
 """
@@ -80,10 +80,10 @@ class Halving:
     ----------
     neighbours : (k, 8) array of int
         Old points.
-    weight : (k, 8) array
+    weight : (k, 8, r, r) array
         Of the deviations there.
-    spread : (k,) array
-        Standard deviation that remains.
+    spread : (k, r, r) array
+        A root of the covariance that remains.
     """
 
     neighbours: NDArray[np.intp]
@@ -97,20 +97,20 @@ class Halving:
         point: NDArray[np.intp],
         random: np.random.Generator,
     ) -> NDArray[np.float64]:
-        """Return drawn deviations of some paths at some new points (k,), from those at old points (count, k + 1)."""
-        value = self.spread[point] * random.standard_normal(path.size)
-        for neighbour, weight in zip(self.neighbours.T, self.weight.T, strict=True):
-            value += old[path, neighbour[point]] * weight[point]
+        """Return drawn deviations of some paths at some new points (k, r), from those at old ones (count, k + 1, r)."""
+        value = _times(self.spread[point], random.standard_normal((path.size, old.shape[2])))
+        for neighbour, weight in zip(self.neighbours.T, self.weight.swapaxes(0, 1), strict=True):
+            value += _times(weight[point], old[path, neighbour[point]])
         return value
 
     def applied(
         self, old: NDArray[np.float64], near: NDArray[np.bool_], random: np.random.Generator
     ) -> NDArray[np.float64]:
-        """Return deviations on the finer grid (count, 2 k + 1) from those at old points (count, k + 1).
+        """Return deviations on the finer grid (count, 2 k + 1, r) from those at old points (count, k + 1, r).
 
         New ones are drawn where ``near`` (count, k); elsewhere they lie straight between their neighbours.
         """
-        finer = np.empty((len(old), old.shape[1] + near.shape[1]))
+        finer = np.empty((len(old), old.shape[1] + near.shape[1], old.shape[2]))
         finer[:, ::2] = old
         finer[:, 1::2] = 0.5 * (old[:, 1:] + old[:, :-1])
         path, point = np.nonzero(near)
@@ -118,39 +118,45 @@ class Halving:
         return finer
 
     def expected(self, old: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return what deviations at old points (count, k + 1) let expect on the finer grid (count, 2 k + 1)."""
-        finer = np.empty((len(old), old.shape[1] + self.spread.size))
+        """Return what deviations at old points (count, k + 1, r) let expect on the finer grid (count, 2 k + 1, r)."""
+        finer = np.empty((len(old), old.shape[1] + len(self.spread), old.shape[2]))
         finer[:, ::2] = old
-        finer[:, 1::2] = np.einsum("ckj,kj->ck", old[:, self.neighbours], self.weight)
+        finer[:, 1::2] = np.einsum("ckjb,kjab->cka", old[:, self.neighbours], self.weight)
         return finer
 
 
+def _times(matrix: NDArray[np.float64], vector: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return products of matrices (k, r, r) and vectors (k, r) of few components."""
+    product = matrix[:, :, 0] * vector[:, :1]
+    for b in range(1, vector.shape[1]):
+        product += matrix[:, :, b] * vector[:, b, None]
+    return product
+
+
 @dataclass(frozen=True, eq=False)
-class OneOutput:
-    """One output, by its covariance R between all points drawn; between them by a few neighbours.
+class JointOutputs:
+    """Few outputs by their covariance between all points drawn; between them, where asked, by a few neighbours.
+
+    The covariance may be one that no chain makes, such as after something was measured.
 
     Attributes
     ----------
-    drawn, seen : Grid
-    covariance : (m, m) array
-        R.
+    drawn : Grid
+    covariance : (m, r, m, r) array
     halvings : tuple of Halving
         From the grid drawn to the grid seen.
-    between : (m, 1) array
-        How far a path goes between two points drawn without being seen at either: a few of its standard deviations
-        there, given both.
+    finer : Grid or None
+        The grid seen; that drawn without it.
     """
 
     drawn: Grid
-    seen: Grid
     covariance: NDArray[np.float64]
-    halvings: tuple[Halving, ...]
-    between: NDArray[np.float64]
+    halvings: tuple[Halving, ...] = ()
+    finer: Grid | None = None
 
-    @cached_property
-    def std(self) -> NDArray[np.float64]:
-        """Standard deviation at the points drawn, (m, 1)."""
-        return np.sqrt(np.maximum(np.diagonal(self.covariance), 0.0))[:, None]
+    @property
+    def seen(self) -> Grid:
+        return self.finer or self.drawn
 
     @property
     def stride(self) -> int:
@@ -158,28 +164,50 @@ class OneOutput:
         return 2 ** len(self.halvings)
 
     @cached_property
+    def std(self) -> NDArray[np.float64]:
+        """Standard deviation at the points drawn, (m, r)."""
+        return np.sqrt(np.maximum(np.einsum("mrmr->mr", self.covariance), 0.0))
+
+    def instant_covariance(self) -> NDArray[np.float64]:
+        """Return the covariance of outputs at each point drawn, (m, r, r)."""
+        m = self.drawn.times.size
+        return self.covariance[np.arange(m), :, np.arange(m)]
+
+    @cached_property
+    def between(self) -> NDArray[np.float64]:
+        """How far a path goes between two points drawn without being seen at either, (m, r)."""
+        own = np.einsum("mrnr->rmn", self.covariance)
+        lags = (np.diagonal(own, lag, axis1=1, axis2=2).T for lag in (0, 1, 2))
+        return _unseen(*lags)
+
+    def restricted(self, points: slice, outputs: NDArray[np.intp]) -> JointOutputs | None:
+        """Return the process at some consecutive points drawn and of some outputs; None where that saves nothing."""
+        if self.halvings:
+            return None
+        grid = self.drawn
+        part = Grid(grid.times[points], grid.mean[points][:, outputs], grid.diffusion[points][:, outputs])
+        return JointOutputs(part, self.covariance[points][:, outputs][:, :, points][..., outputs])
+
+    @cached_property
     def expected(self) -> NDArray[np.float64]:
-        """What deviations at the points drawn let expect at those seen, (m seen, m)."""
-        found = np.eye(self.drawn.times.size)
+        """What deviations at the points drawn let expect at those seen, (m seen, r, m, r)."""
+        m, r = self.drawn.mean.shape
+        found = np.eye(m * r).reshape(m * r, m, r)
         for halving in self.halvings:
             found = halving.expected(found)
-        return found.T
+        return np.moveaxis(found.reshape(m, r, *found.shape[1:]), (2, 3), (0, 1))
 
     @cached_property
     def _factor(self) -> NDArray[np.float64]:
-        return _root(self.covariance)
+        return _root(self.covariance.reshape(self.std.size, self.std.size))
 
     def deviations(self, random: np.random.Generator, count: int) -> NDArray[np.float64]:
         """Return drawn deviations from the mean, (count, m, r)."""
-        return (random.standard_normal((count, self.drawn.times.size)) @ self._factor.T)[:, :, None]
+        return (random.standard_normal((count, self.std.size)) @ self._factor.T).reshape(count, *self.std.shape)
 
     def covariances(self, points: NDArray[np.intp], outputs: NDArray[np.intp]) -> NDArray[np.float64]:
         """Return covariances of everything with chosen outputs at chosen points, (len(points), m, r)."""
-        return self.covariance[points][:, :, None]
-
-    def restricted(self, points: slice, outputs: NDArray[np.intp]) -> ManyOutputs | None:
-        """Return the process at some consecutive points drawn and of some outputs; None where that saves nothing."""
-        return None
+        return self.covariance[points, outputs]
 
     def steps_near(
         self, deviations: NDArray[np.float64], near: NDArray[np.bool_], random: np.random.Generator
@@ -190,7 +218,7 @@ class OneOutput:
         """
         if not self.halvings:
             return Steps.of(deviations, near), Steps.of_every_second(deviations, near)
-        found = deviations[:, :, 0]
+        found = deviations
         for halving in self.halvings[:-1]:
             steps = near[:, 1:] | near[:, :-1]
             wider = steps.copy()
@@ -198,62 +226,87 @@ class OneOutput:
                 wider[:, 1:] |= wider[:, :-1].copy()
                 wider[:, :-1] |= wider[:, 1:].copy()
             found = halving.applied(found, wider, random)
-            finer = np.zeros(found.shape, bool)
+            finer = np.zeros(found.shape[:2], bool)
             finer[:, ::2], finer[:, 1::2] = near, steps
             near = finer
-        coarser = Steps.of(found[:, :, None], near)
+        coarser = Steps.of(found, near)
         path, step = coarser.path, coarser.step
-        middle = self.halvings[-1].between(found, path, step, random)[:, None]
+        middle = self.halvings[-1].between(found, path, step, random)
         both = np.stack([coarser.begin, middle], axis=1), np.stack([middle, coarser.end], axis=1)
-        begin, end = (part.reshape(-1, 1) for part in both)
+        begin, end = (part.reshape(-1, found.shape[2]) for part in both)
         halves = np.stack([2 * step, 2 * step + 1], axis=1).ravel()
         return Steps(np.repeat(path, 2), halves, begin, end), coarser
 
 
-def one_output(
+def joint_outputs(
     chain: MarkovChain,
     row: NDArray[np.float64],
     mean: NDArray[np.float64],
     halvings: int = 0,
     sources: Sequence[int] | None = None,
-) -> OneOutput:
-    """Return the process of one output of a chain.
+) -> JointOutputs:
+    """Return the process of a few outputs of a chain.
 
     Parameters
     ----------
     chain : MarkovChain
         At (m - 1) 2^halvings + 1 times.
-    row : (m', n) array
-        Of the output over the states, at the times of the chain.
-    mean : (m',) array
+    row : (m', r, n) array
+        Of the outputs over the states, at the times of the chain.
+    mean : (m', r) array
     halvings : int
         How often the grid drawn is halved to the grid of the chain.
     sources : sequence of int, optional
         Numbers of those that act; all without it.
     """
     P = chain.covariance(sources)
-    seen = Grid(chain.times, mean[:, None], _diffusion(row[:, None] @ chain.acting_noise_matrix(sources)))
+    seen = Grid(chain.times, mean, _diffusion(row @ chain.acting_noise_matrix(sources)))
     stride = 2**halvings
     at = slice(None, None, stride)
     drawn = Grid(seen.times[at], seen.mean[at], seen.diffusion[at])
-    m, n = drawn.times.size, row.shape[1]
-    columns = np.zeros((n, m))  # Phi(t_k, t_j) P(t_j) C(t_j)' for all j up to k
-    R = np.zeros((m, m))
+    covariance = _joint_covariance(chain, row, P, stride)
+    if not halvings:
+        return JointOutputs(drawn, covariance)
+    band = _band(chain, row, P, (2 * NEIGHBOURS - 1) * stride)
+    found = tuple(_halving(band, stride // 2**k) for k in range(halvings))
+    return JointOutputs(drawn, covariance, found, seen)
+
+
+def joint_covariance(
+    chain: MarkovChain, row: NDArray[np.float64], sources: Sequence[int] | None = None
+) -> NDArray[np.float64]:
+    """Return the covariance of outputs between all times of a chain, (m, r, m, r).
+
+    Parameters
+    ----------
+    chain : MarkovChain
+    row : (m, r, n) array
+        Of the outputs over the states.
+    sources : sequence of int, optional
+        Numbers of those that act; all without it.
+    """
+    return _joint_covariance(chain, row, chain.covariance(sources), 1)
+
+
+def _joint_covariance(
+    chain: MarkovChain, row: NDArray[np.float64], P: NDArray[np.float64], stride: int
+) -> NDArray[np.float64]:
+    """Return the covariance of outputs between every so many times of a chain, (m, r, m, r)."""
+    rows, P = row[::stride], P[::stride]
+    m, r, n = rows.shape
+    found = np.zeros((m * r, m * r))
+    columns = np.zeros((n, m * r))  # Phi(t_k, t_j) P(t_j) C(t_j)' for all j up to k
     for k in range(m):
+        now, before = slice(k * r, (k + 1) * r), slice(0, k * r)
         if k:
             Phi = chain.transition[(k - 1) * stride]
             for further in chain.transition[(k - 1) * stride + 1 : k * stride]:
                 Phi = further @ Phi
-            columns[:, :k] = Phi @ columns[:, :k]
-        columns[:, k] = P[k * stride] @ row[k * stride]
-        R[k, : k + 1] = row[k * stride] @ columns[:, : k + 1]
-        R[: k + 1, k] = R[k, : k + 1]
-    found = []
-    if halvings:
-        band = _band(chain, row, P, (2 * NEIGHBOURS - 1) * stride)
-        found = [_halving(band, stride // 2**k) for k in range(halvings)]
-    lags = (np.diagonal(R, lag)[:, None] for lag in (0, 1, 2))
-    return OneOutput(drawn, seen, R, tuple(found), _unseen(*lags))
+            columns[:, before] = Phi @ columns[:, before]
+        columns[:, now] = P[k] @ rows[k].T
+        found[now, : (k + 1) * r] = rows[k] @ columns[:, : (k + 1) * r]
+        found[: (k + 1) * r, now] = found[now, : (k + 1) * r].T
+    return found.reshape(m, r, m, r)
 
 
 def _root(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -292,41 +345,42 @@ def _unseen(
 
 
 def _band(chain: MarkovChain, row: NDArray[np.float64], P: NDArray[np.float64], width: int) -> NDArray[np.float64]:
-    """Return R(t_i, t_{i - l}) for l = 0 ... width - 1, (m, width); zero before the first time."""
-    m, n = row.shape
-    band = np.zeros((m, width))
-    columns = np.zeros((n, width))
+    """Return R(t_i, t_{i - l}) for l = 0 ... width - 1, (m, width, r, r); zero before the first time."""
+    m, r, n = row.shape
+    band = np.zeros((m, r, width * r))
+    columns = np.zeros((n, width * r))
     for i in range(m):
         if i:
-            columns[:, 1:] = chain.transition[i - 1] @ columns[:, :-1]
-        columns[:, 0] = P[i] @ row[i]
+            columns[:, r:] = chain.transition[i - 1] @ columns[:, :-r]
+        columns[:, :r] = P[i] @ row[i].T
         band[i] = row[i] @ columns
-    return band
+    return band.reshape(m, r, width, r).swapaxes(1, 2)
 
 
 def _halving(band: NDArray[np.float64], stride: int) -> Halving:
     """Return how points in the middle of a grid, each ``stride`` points of the band apart, follow from that grid."""
     last = (len(band) - 1) // stride  # number of the last old point
-    count = min(NEIGHBOURS, last + 1)
+    count, r = min(NEIGHBOURS, last + 1), band.shape[2]
     first = np.clip(np.arange(last) + 1 - count // 2, 0, last + 1 - count)
     neighbours = first[:, None] + np.arange(count)
     middle = stride * np.arange(last) + stride // 2
 
     def covariance(i: NDArray, j: NDArray) -> NDArray[np.float64]:
-        later = np.maximum(i, j)
-        return band[later, later - np.minimum(i, j)]
+        found = band[np.maximum(i, j), np.abs(i - j)]
+        return np.where((i < j)[..., None, None], found.swapaxes(-1, -2), found)
 
     old = stride * neighbours
-    K = covariance(old[:, :, None], old[:, None, :])
-    k = covariance(middle[:, None], old)
+    K = covariance(old[:, :, None], old[:, None, :]).swapaxes(2, 3).reshape(last, count * r, count * r)
+    k = covariance(*np.broadcast_arrays(middle[:, None], old)).swapaxes(1, 2).reshape(last, r, count * r)
     own = band[middle, 0]
     size = np.sqrt(np.maximum(np.einsum("mii->mi", K), 0.0))
     unit = np.where(size > 0, size, 1.0)
     correlation = K / (unit[:, :, None] * unit[:, None, :])
-    correlation[:, np.arange(count), np.arange(count)] = 1.0 + JITTER[-2]
-    weight = np.linalg.solve(correlation, (k / unit)[:, :, None])[:, :, 0] / unit
-    remains = own - (weight * k).sum(axis=1)
-    return Halving(neighbours, weight, np.sqrt(np.maximum(remains, 0.0)))
+    correlation[:, np.arange(count * r), np.arange(count * r)] = 1.0 + JITTER[-2]
+    weight = np.linalg.solve(correlation, (k / unit[:, None]).swapaxes(1, 2)).swapaxes(1, 2) / unit[:, None]
+    remains = own - weight @ k.swapaxes(1, 2)
+    spread = symmetric_root(remains) if r > 1 else np.sqrt(np.maximum(remains, 0.0))
+    return Halving(neighbours, weight.reshape(last, r, count, r).swapaxes(1, 2), spread)
 
 
 def _diffusion(direct: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -393,6 +447,10 @@ class ManyOutputs:
     def std(self) -> NDArray[np.float64]:
         return np.sqrt(np.maximum(np.einsum("mri,mij,mrj->mr", self.row, self._P, self.row, optimize=True), 0.0))
 
+    def instant_covariance(self) -> NDArray[np.float64]:
+        """Return the covariance of outputs at each point, (m, r, r)."""
+        return self.row @ self._P @ self.row.swapaxes(1, 2)
+
     @cached_property
     def _roots(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Roots of the covariance at the start and of what noise adds in each step."""
@@ -451,94 +509,3 @@ class ManyOutputs:
     def _seen(self, states: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return outputs (count, m, r) of states (m, count, n)."""
         return np.ascontiguousarray((states / self._scale @ self._rows_on_scale).swapaxes(0, 1))
-
-
-@dataclass(frozen=True, eq=False)
-class JointOutputs:
-    """Few outputs by their covariance between all times, such as after something was measured: no chain makes them.
-
-    Attributes
-    ----------
-    drawn : Grid
-    covariance : (m, r, m, r) array
-    """
-
-    drawn: Grid
-    covariance: NDArray[np.float64]
-
-    @property
-    def seen(self) -> Grid:
-        return self.drawn
-
-    @property
-    def stride(self) -> int:
-        return 1
-
-    @cached_property
-    def std(self) -> NDArray[np.float64]:
-        """Standard deviation at the points drawn, (m, r)."""
-        return np.sqrt(np.maximum(np.einsum("mrmr->mr", self.covariance), 0.0))
-
-    @cached_property
-    def between(self) -> NDArray[np.float64]:
-        """How far a path goes between two points drawn without being seen at either, (m, r)."""
-        own = np.einsum("mrnr->rmn", self.covariance)
-        lags = (np.diagonal(own, lag, axis1=1, axis2=2).T for lag in (0, 1, 2))
-        return _unseen(*lags)
-
-    def restricted(self, points: slice, outputs: NDArray[np.intp]) -> JointOutputs | None:
-        """Return the process at some consecutive points drawn and of some outputs; None where that saves nothing."""
-        grid = self.drawn
-        part = Grid(grid.times[points], grid.mean[points][:, outputs], grid.diffusion[points][:, outputs])
-        return JointOutputs(part, self.covariance[points][:, outputs][:, :, points][..., outputs])
-
-    @cached_property
-    def _factor(self) -> NDArray[np.float64]:
-        return _root(self.covariance.reshape(self.std.size, self.std.size))
-
-    def deviations(self, random: np.random.Generator, count: int) -> NDArray[np.float64]:
-        """Return drawn deviations from the mean, (count, m, r)."""
-        return (random.standard_normal((count, self.std.size)) @ self._factor.T).reshape(count, *self.std.shape)
-
-    def covariances(self, points: NDArray[np.intp], outputs: NDArray[np.intp]) -> NDArray[np.float64]:
-        """Return covariances of everything with chosen outputs at chosen points, (len(points), m, r)."""
-        return self.covariance[points, outputs]
-
-    def steps_near(
-        self, deviations: NDArray[np.float64], near: NDArray[np.bool_], random: np.random.Generator
-    ) -> tuple[Steps, Steps]:
-        """Return the steps of drawn deviations, conditioned or not, beside points ``near`` (count, m).
-
-        On the grid seen, and on every second point of it.
-        """
-        return Steps.of(deviations, near), Steps.of_every_second(deviations, near)
-
-
-def joint_covariance(
-    chain: MarkovChain, row: NDArray[np.float64], sources: Sequence[int] | None = None
-) -> NDArray[np.float64]:
-    """Return the covariance of outputs between all times of a chain, (m, r, m, r).
-
-    Parameters
-    ----------
-    chain : MarkovChain
-    row : (m, r, n) array
-        Of the outputs over the states.
-    sources : sequence of int, optional
-        Numbers of those that act; all without it.
-    """
-    P = chain.covariance(sources)
-    m, r, n = row.shape
-    found = np.zeros((m * r, m * r))
-    columns = np.zeros((n, m * r))  # Phi(t_k, t_j) P(t_j) C(t_j)' for all j up to k
-    for k in range(m):
-        now, before = slice(k * r, (k + 1) * r), slice(0, k * r)
-        if k:
-            columns[:, before] = chain.transition[k - 1] @ columns[:, before]
-        columns[:, now] = P[k] @ row[k].T
-        found[now, : (k + 1) * r] = row[k] @ columns[:, : (k + 1) * r]
-        found[: (k + 1) * r, now] = found[now, : (k + 1) * r].T
-    return found.reshape(m, r, m, r)
-
-
-Process = OneOutput | ManyOutputs | JointOutputs

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from ...model.errors import AscentwindError, AscentwindWarning, ParameterValueError
 
 if TYPE_CHECKING:
-    from .process import Process
+    from .norms import Process
 
 
 class NoVarianceError(AscentwindError):

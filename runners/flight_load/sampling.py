@@ -19,12 +19,16 @@ from scipy.special import log_ndtr, ndtri_exp
 
 from ...codegen.toolchain.interruption import Workers
 from ..solvers.cores import available_cores
+from ..statistics.norm import NormOfNormal
+from ..statistics.percentiles import Sides, instant_level
 from .crossings import Boundary, Sightings, sightings
-from .process import Process
+from .norms import Norms, Process
+from .process import Steps
 
 LEFT_OUT = 2e-3  # of the probability, at most, that is passed only where no path is drawn
 TOGETHER = 512  # paths that a thread draws at a time, from a stream of their own: as many threads, the same numbers
 MEMORY = 2e7  # numbers in an array of paths at a time
+EVERY = slice(None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,12 +99,42 @@ class Draws:
 
 def instant_probabilities(process: Process, boundary: Boundary) -> NDArray[np.float64]:
     """Return the logarithm of the probability of being beyond a boundary on the grid drawn, (2 sides, m, r)."""
+    if isinstance(process, Norms):
+        return process.instant_probabilities(boundary)
     std, mean = process.std, process.drawn.mean
     beyond = np.stack([mean - boundary.upper, boundary.lower - mean])
     with np.errstate(divide="ignore", invalid="ignore"):
         deviate = beyond / std
     # without spread an output is beyond or not
     return np.where(std > 0, log_ndtr(np.where(std > 0, deviate, 0.0)), np.where(beyond > 0, 0.0, -np.inf))
+
+
+def largest_instant(process: Process, boundary: Boundary) -> float:
+    """Return the logarithm of the probability of being beyond a boundary at the worst point, output and side drawn."""
+    if isinstance(process, Norms):
+        return process.largest_instant(boundary)
+    return float(instant_probabilities(process, boundary).max())
+
+
+def instant_levels(process: Process, probability: float, sides: Sides, points: slice = EVERY) -> NDArray[np.float64]:
+    """Return the level that each output passes with a probability at each of some points drawn, (k, r)."""
+    if isinstance(process, Norms):
+        return NormOfNormal(process.law.mean[points], process.law.covariance[points]).percentile(probability)
+    return instant_level(process.drawn.mean[points], process.std[points], probability, sides)
+
+
+def sighted_steps(process: Process, count: int, steps: Steps, boundary: Boundary, every: int = 1) -> Sightings:
+    """Return those of some steps of drawn deviations that come near a boundary; as :func:`sightings`."""
+    if isinstance(process, Norms):
+        return process.sightings(count, steps, boundary, every)
+    return sightings(count, steps, boundary, process.seen, every)
+
+
+def steps_near(
+    process: Process, deviations: NDArray[np.float64], near: NDArray[np.bool_], random: np.random.Generator
+) -> tuple[Steps, Steps]:
+    """Return the steps of deviations beside points ``near`` (count, m) on the grid seen and on every second point."""
+    return (process.of if isinstance(process, Norms) else process).steps_near(deviations, near, random)
 
 
 def draw_beyond(
@@ -132,9 +166,9 @@ def _drawn(process: Process, boundary: Boundary, random: np.random.Generator, co
 
     def part(size: int, own: np.random.Generator) -> tuple[Sightings, Sightings, NDArray, NDArray]:
         deviations, close, weight = _paths_beyond(process, boundary, own, size)
-        steps, every_second = process.steps_near(deviations, close, own)
-        near = sightings(size, steps, boundary, process.seen)
-        coarser = sightings(size, every_second, boundary, process.seen, every=2)
+        steps, every_second = steps_near(process, deviations, close, own)
+        near = sighted_steps(process, size, steps, boundary)
+        coarser = sighted_steps(process, size, every_second, boundary, every=2)
         return near, coarser, weight, deviations if keep else weight
 
     with Workers(min(len(sizes), available_cores())) as pool:
@@ -164,7 +198,11 @@ def _paths_beyond(
     process: Process, boundary: Boundary, random: np.random.Generator, count: int
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.float64]]:
     """Return deviations (count, m, r) on the grid drawn, where paths are near the boundary (count, m), and weights."""
-    inner = boundary.at(slice(None, None, process.stride)).drawn_in(process.between)
+    outer, reach = boundary.at(slice(None, None, process.stride)), 2 * process.between
+    if isinstance(process, Norms):
+        deviations, sizes, weight = process.paths_beyond(outer, random, count)
+        return deviations, _may_be_first(sizes, outer.upper, reach), weight
+    inner = outer.drawn_in(process.between)
     log_p = instant_probabilities(process, inner)
     log_sum = float(np.logaddexp.reduce(log_p, axis=None))
     deviations = process.deviations(random, count)
@@ -183,7 +221,6 @@ def _paths_beyond(
     deviations += gain[:, None, None] * process.covariances(points, outputs)
     drawn = process.drawn.mean + deviations
     number = (drawn > inner.upper).sum(axis=(1, 2)) + (drawn < inner.lower).sum(axis=(1, 2))
-    outer, reach = boundary.at(slice(None, None, process.stride)), 2 * process.between
     near = _may_be_first(drawn, outer.upper, reach) | _may_be_first(-drawn, -outer.lower, reach)
     return deviations, near, np.exp(log_sum - np.log(np.maximum(number, 1)))
 

@@ -14,22 +14,28 @@ from collections.abc import Iterable
 import numpy as np
 import xarray as xr
 
+from ...codegen.nodes.compiled import node_functions_of
 from ...codegen.toolchain.interruption import Workers
 from ..case.provenance import provenance
 from ..sensitivity.many import sensitivities
+from ..sensitivity.one import refuse_undefined
+from ..sensitivity.percentile import two_forms
+from ..sensitivity.request import parameter_rows
 from ..solvers.cores import available_cores
-from .pathwise import Movement
+from ..solvers.flight_nodes import FlightNodes
+from .pathwise import Movement, Reaching
 from .probability import Level
 from .response import ResponseInWindow
 
 GROUPS = 12  # of the times at which a level is passed
+GROUPS_OF_RESULTANT = 4  # the same of both planes, each of two adjoint pairs
 LEADING = 12  # parameters that are followed along the paths where none are named
 STEP = 1e-3  # relative, of a parameter
 TOLERANCE = 1e-9  # of the sweep
 
 
 def level_sensitivity(
-    of: ResponseInWindow, level: Level, moved: Movement, parameters: Iterable[str] | None
+    of: ResponseInWindow, level: Level, moved: Movement, paths: Reaching | None, parameters: Iterable[str] | None
 ) -> xr.Dataset:
     """See :meth:`FlightLoad.sensitivity`.
 
@@ -39,10 +45,14 @@ def level_sensitivity(
     level : Level
     moved : Movement
         How the level moves with mean and covariance of the response.
+    paths : Reaching or None
+        Of a resultant: paths that just reach the level.
     parameters : iterable of str or None
     """
     known = of.case.parameters
-    times, envelope = _envelope(of, level, parameters)
+    times, envelope = (
+        _envelope(of, level, parameters) if paths is None else _envelope_of_resultant(of, paths, parameters)
+    )
     names = [str(name) for name in envelope["parameter"].values]
     size = np.abs(envelope.values * [known[name].value for name in names])
     chosen = names if parameters is not None else [names[k] for k in np.argsort(-size)[:LEADING]]
@@ -80,9 +90,8 @@ def _along_paths(of: ResponseInWindow, moved: Movement, name: str) -> float:
     """Return the derivative of the level by one parameter, as its paths move."""
     value = of.case.parameters[name].value
     step = STEP * abs(value) or STEP**2
-    ends = [of.with_parameters({name: value + sign * step}).drawn_process(TOLERANCE) for sign in (1.0, -1.0)]
-    moments = ([end.drawn.mean[:, 0], end.covariance, end.drawn.diffusion[:, 0] ** 2] for end in ends)
-    return moved.change(*((more - less) / (2 * step) for more, less in zip(*moments, strict=True)))
+    ends = [of.with_parameters({name: value + sign * step}).moments(TOLERANCE) for sign in (1.0, -1.0)]
+    return moved.change(*((more - less) / (2 * step) for more, less in zip(*ends, strict=True)))
 
 
 def _envelope(of: ResponseInWindow, level: Level, parameters: Iterable[str] | None) -> tuple[list[float], xr.DataArray]:
@@ -103,3 +112,33 @@ def _envelope(of: ResponseInWindow, level: Level, parameters: Iterable[str] | No
             dm, ds = (found["derivative"].values[number, 0] for found in (by_mean, by_std))
             derivative += part * (sign * dm + sigmas * ds)
     return at_times, xr.DataArray(derivative, {"parameter": by_std["parameter"].values}, ("parameter",))
+
+
+def _envelope_of_resultant(
+    of: ResponseInWindow, paths: Reaching, parameters: Iterable[str] | None
+) -> tuple[list[float], xr.DataArray]:
+    """Return times at which a resultant's level is passed and its derivatives by mean vector and covariance there.
+
+    A path that passes along e moves the level by e . dm + k e . dS e / (2 s), s the sigma along e and k sigmas away.
+    """
+    case, e, share = of.case, paths.direction, paths.share
+    rows = parameter_rows(case, parameters)
+    covariance = paths.outputs.instant_covariance()[paths.nearest]
+    sigma = np.sqrt(np.einsum("kr,krs,ks->k", e, covariance, e))
+    away = (paths.level - paths.mean) / sigma
+    order = np.argsort(paths.point, kind="stable")
+    passed = (np.cumsum(share[order]) - 0.5 * share[order]) * GROUPS_OF_RESULTANT
+    group = np.empty(share.size, int)
+    group[order] = np.minimum(passed.astype(int), GROUPS_OF_RESULTANT - 1)
+    used = [at for at in (np.flatnonzero(group == g) for g in range(GROUPS_OF_RESULTANT)) if at.size]
+    times = [round(float(paths.outputs.seen.times[paths.point[at]] @ share[at] / share[at].sum()), 6) for at in used]
+    flight = FlightNodes.until(case.with_means, node_functions_of(case.executable), times, keep=True)
+    derivative = np.zeros(len(rows))
+    for time, at in zip(times, used, strict=True):
+        by_mean = share[at] @ e[at]
+        by_covariance = np.einsum("k,kr,ks->rs", share[at] * away[at] / (2 * sigma[at]), e[at], e[at])
+        for _, gradient, _ in two_forms(case, flight, of.outputs, time, by_mean, by_covariance):
+            refuse_undefined(case.system, gradient, rows)
+            derivative += gradient.parameters[rows]
+    names = [case.system.parameters[i].name for i in rows]
+    return times, xr.DataArray(derivative, {"parameter": names}, ("parameter",))

@@ -16,8 +16,8 @@ from scipy.optimize import root_scalar
 from ...model.errors import ParameterValueError, UnknownNameError
 from ..statistics.percentiles import Sides
 from .crossings import Boundary
+from .norms import Process
 from .probability import SOLVED, Level
-from .process import OneOutput
 from .response import ResponseInWindow
 from .sampling import Draws, draw_beyond
 
@@ -26,7 +26,7 @@ NEARER = 0.05  # of the level, within which the level of the mixture is looked f
 MOST_NEARER = 12  # times
 
 
-def processes_of(of: ResponseInWindow, parameter: str, spread: float) -> list[OneOutput]:
+def processes_of(of: ResponseInWindow, parameter: str, spread: float) -> list[Process]:
     """Return the response with the parameter at each node of the quadrature.
 
     Raises
@@ -44,7 +44,7 @@ def processes_of(of: ResponseInWindow, parameter: str, spread: float) -> list[On
 
 
 def uncertain_level(
-    processes: Sequence[OneOutput],
+    processes: Sequence[Process],
     level: Level,
     probability: float,
     sides: Sides,

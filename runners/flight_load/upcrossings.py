@@ -17,7 +17,7 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-from ...model.errors import AscentwindError
+from ...model.errors import AscentwindError, ParameterValueError
 from ..statistics.percentiles import Sides
 from .response import ResponseInWindow
 
@@ -48,7 +48,11 @@ def upcrossing_rate(of: ResponseInWindow, level: float, sides: Sides) -> xr.Data
     ------
     NotDifferentiableError
     """
-    chain, row = of.chain, of.number
+    if of.is_resultant:
+        raise ParameterValueError(
+            f"'{of.response}' is a resultant, whose upcrossings have no formula here; ask for the probability itself"
+        )
+    chain, (row,) = of.chain, of.rows
     C, times, mean = chain.output[:, row], chain.times, chain.mean[:, row]
     rough = np.flatnonzero(np.any(np.einsum("mi,min->mn", C, chain.noise_matrix), axis=1))
     if rough.size:

@@ -38,7 +38,7 @@ from .start import StartShare, start_share
 from .tables import TotalDensity, table_sensitivities, total_density
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
     from ..case.case import Case
 
@@ -64,14 +64,8 @@ def percentile_sensitivity(
     law = _law(case, names, time)
     level = float(law.percentile(probability))
     by_mean, by_covariance = law.derivatives(probability)
-    factors, axes = np.linalg.eigh(by_covariance)
-    forms = np.zeros((2, len(case.system.outputs)))
-    forms[:, [case.system.output_index(name) for name in names]] = axes.T
     flight = FlightNodes.until(case.with_means, node_functions_of(case.executable), [time], keep=True)
-    parts: list[tuple[AdjointPair, Gradient, float]] = []
-    for form, factor, along in zip(forms, factors.tolist(), (axes.T @ by_mean).tolist(), strict=True):
-        pair = AdjointPair(flight, form, time, case.system.sources)
-        parts.append((pair, gradient_of(pair, factor, along), factor))
+    parts = two_forms(case, flight, names, time, by_mean, by_covariance)
     pair, gradient = parts[0][0], _sum_of_gradients([part[1] for part in parts])
     refuse_undefined(case.system, gradient, rows)
     variables, coordinates = parameter_sensitivities(case, gradient, rows, level)
@@ -98,6 +92,40 @@ def percentile_sensitivity(
         "steps": pair.steps,
     }
     return dataset
+
+
+def two_forms(
+    case: Case,
+    flight: FlightNodes,
+    names: Sequence[str],
+    time: float,
+    by_mean: NDArray[np.float64],
+    by_covariance: NDArray[np.float64],
+) -> list[tuple[AdjointPair, Gradient, float]]:
+    """Return the two linear forms whose variances and means make g . dm + G : dS: adjoint, gradient, factor c.
+
+    Parameters
+    ----------
+    case : Case
+    flight : FlightNodes
+        To ``time`` at least.
+    names : sequence of str
+        Both responses.
+    time : float
+        s.
+    by_mean : (2,) array
+        g.
+    by_covariance : (2, 2) array
+        G, symmetric.
+    """
+    factors, axes = np.linalg.eigh(by_covariance)
+    forms = np.zeros((2, len(case.system.outputs)))
+    forms[:, [case.system.output_index(name) for name in names]] = axes.T
+    parts: list[tuple[AdjointPair, Gradient, float]] = []
+    for form, factor, along in zip(forms, factors.tolist(), (axes.T @ by_mean).tolist(), strict=True):
+        pair = AdjointPair(flight, form, time, case.system.sources)
+        parts.append((pair, gradient_of(pair, factor, along), factor))
+    return parts
 
 
 def _law(case: Case, names: tuple[str, str], time: float) -> NormOfNormal:

@@ -126,7 +126,7 @@ def chain_by_sweep(
     at = np.where(times > system.start, np.searchsorted(segments.end, times), -1)
     for k in range(at[0] + 1):
         P = found.transition[k] @ P @ found.transition[k].T + found.added[k]
-    transition, added = found.transition[at[1:]].copy(), found.added[at[1:]].copy()
+    transition, added = found.transition[at[1:]], found.added[at[1:]]
     for step, (before, last) in enumerate(pairwise(at.tolist())):
         for k in range(last - 1, before, -1):  # a step in which flight is cut again, from its end to its begin
             added[step] += transition[step] @ found.added[k] @ transition[step].T

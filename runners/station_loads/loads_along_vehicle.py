@@ -25,7 +25,7 @@ from ...model.system.names import COMBINED
 from ...model.vehicle.columns import local_load_columns
 from ...model.vehicle.loads import AXIAL_FORCE, BENDING_MOMENT, SHEAR_FORCE, SIDES
 from ...model.vehicle.noise_loads import component_deviations, deviating_tables, loading_deviations
-from ...model.vehicle.planes import flown_planes, one_wind
+from ...model.vehicle.planes import Plane, flown_planes, one_wind
 from ...model.vehicle.vehicle import Vehicle
 from ...model.vehicle.zones import PREFIX as ZONES
 from ..case.case import Case
@@ -80,6 +80,7 @@ def load_rows(
     *,
     load: str = BENDING_MOMENT,
     slosh_reaction: bool = True,
+    plane: Plane | None = None,
 ) -> LoadRows:
     """Return a load at stations in terms of the states at each time; from the left where flight jumps.
 
@@ -95,17 +96,21 @@ def load_rows(
         One of ``LOADS``.
     slosh_reaction : bool
         As for :func:`loads_along_vehicle`.
+    plane : Plane, optional
+        Of a vehicle in both planes: which.
 
     Raises
     ------
     DataError, TimeRangeError, DirectNoiseError, UnknownNameError
     """
     vehicle = case.vehicle_for(f"the {_words(load)} along the vehicle")
-    one_wind(vehicle, "a load along the vehicle as rows of the states")
+    if plane is None:
+        one_wind(vehicle, "a load along the vehicle as rows of the states")
+    view, prefix, scope = (vehicle, "", "") if plane is None else (plane.vehicle, plane.prefix, plane.scope)
     at = np.array(case.checked_times(times), float)
-    along = _along(case, vehicle, load, at, slosh_reaction)
-    chosen = np.arange(along.station.size) if stations is None else _chosen(along.station, stations, vehicle, load)
-    names = _components(vehicle)
+    along = _along(case, view, load, at, slosh_reaction, scope)
+    chosen = np.arange(along.station.size) if stations is None else _chosen(along.station, stations, view, load)
+    names = [prefix + name for name in _components(view)]
     components = _with_components(case, vehicle)
     components.system.refuse_direct_noise(names)
     outputs = [components.system.output_index(name) for name in names]

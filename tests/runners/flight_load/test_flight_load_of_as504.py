@@ -7,7 +7,7 @@ import pytest
 
 from ascentwind.runners.flight_load.crossings import Boundary
 from ascentwind.runners.flight_load.probability import Level, find_level
-from ascentwind.runners.flight_load.process import Grid, OneOutput
+from ascentwind.runners.flight_load.process import Grid, JointOutputs
 from ascentwind.runners.solvers.ensemble import run_ensemble
 
 RESPONSES = ("bending_moment", "angle_of_attack", "engine_angle")
@@ -34,10 +34,10 @@ def flown(as504) -> np.ndarray:
     return np.concatenate(found)
 
 
-def on_the_grid(process: OneOutput, p: float) -> Level:
+def on_the_grid(process: JointOutputs, p: float) -> Level:
     """The level of the points drawn alone, as flights on that grid meet it."""
     bare = Grid(process.drawn.times, process.drawn.mean, np.zeros_like(process.drawn.diffusion))
-    alone = OneOutput(bare, bare, process.covariance, (), np.zeros_like(process.between))
+    alone = JointOutputs(bare, process.covariance)
 
     def boundary(u: float) -> Boundary:
         return Boundary.around(np.full(bare.mean.shape, u), "both")

@@ -17,7 +17,7 @@ from scipy.stats import norm
 from ascentwind.runners import Study
 from ascentwind.runners.flight_load.crossings import Boundary
 from ascentwind.runners.flight_load.probability import Level, find_level
-from ascentwind.runners.flight_load.process import Grid, OneOutput
+from ascentwind.runners.flight_load.process import Grid, JointOutputs
 from ascentwind.runners.flight_load.sampling import draw_beyond
 from ascentwind.runners.statistics.percentiles import instant_level
 
@@ -60,7 +60,7 @@ def test_without_bridges_brownian_motion_is_low_by_the_known_shift(wiener):
     at = slice(None, None, 8)
     times = load.process.drawn.times[at]
     bare = Grid(times, np.zeros((times.size, 1)), np.zeros((times.size, 1)))
-    on_grid = OneOutput(bare, bare, load.process.covariance[at, at], (), np.zeros((times.size, 1)))
+    on_grid = JointOutputs(bare, load.process.covariance[at][:, :, at])
     u, dt = 5.0, times[1] - times[0]
     boundary = Boundary.around(np.full(bare.mean.shape, u), "upper")
     found = draw_beyond(on_grid, boundary, np.random.default_rng(1), 20_000).contributions(boundary)

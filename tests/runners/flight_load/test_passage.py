@@ -14,7 +14,7 @@ from ascentwind.runners.flight_load import limits as limits_module
 from ascentwind.runners.flight_load import load as load_module
 from ascentwind.runners.flight_load import sampling
 from ascentwind.runners.flight_load.crossings import Boundary
-from ascentwind.runners.flight_load.process import ManyOutputs, one_output
+from ascentwind.runners.flight_load.process import ManyOutputs, joint_outputs
 from ascentwind.runners.flight_load.sampling import draw_beyond
 from ascentwind.runners.flight_load.window import window_chain
 from ascentwind.runners.statistics.percentiles import Sides
@@ -113,8 +113,8 @@ def test_covariances_are_those_of_the_dense_formula(pair, small):
     np.testing.assert_allclose(found, R[points, outputs], rtol=1e-11, atol=1e-12)
     np.testing.assert_allclose(process.std**2, np.einsum("mrmr->mr", R), rtol=1e-11)
     for r in range(process.row.shape[1]):
-        alone = one_output(process.chain, process.row[:, r], process.mean[:, r])
-        np.testing.assert_allclose(alone.covariance, R[:, r, :, r], rtol=1e-11, atol=1e-14)
+        alone = joint_outputs(process.chain, process.row[:, [r]], process.mean[:, [r]])
+        np.testing.assert_allclose(alone.covariance[:, 0, :, 0], R[:, r, :, r], rtol=1e-11, atol=1e-14)
         np.testing.assert_allclose(process.between[:, [r]], alone.between, rtol=1e-5, atol=1e-5)
 
 
