@@ -19,6 +19,7 @@ __getattr__, __dir__, __all__ = _lazy.attach(
             "DirectNoiseError",
             "ExtrapolationWarning",
             "IntegrationError",
+            "MissingLibraryError",
             "ModeError",
             "NoVehicleError",
             "NonlinearSystemError",
@@ -40,7 +41,6 @@ __getattr__, __dir__, __all__ = _lazy.attach(
         ],
         "model.vehicle.noise_loads": ["NoiseLoadsWarning"],
         "model.wind.correlation_matrix": ["NotPositiveSemidefiniteError", "RepairWarning"],
-        "model.wind.soundings.grids": ["MissingLibraryError"],
         "model.wind.soundings.sounding": ["SoundingError"],
         "runners.design.design": ["InfeasibleDesignError"],
         "runners.design.problem": ["DesignProblemError"],
@@ -56,6 +56,7 @@ __getattr__, __dir__, __all__ = _lazy.attach(
         "runners.parameter_study.cluster": ["SchedulerError"],
         "runners.parameter_study.sampling": ["UnbalancedSampleWarning"],
         "runners.parameter_study.store": ["ResumeError"],
+        "runners.report.folder": ["ResultsFolderError"],
         "runners.sensitivity.one": ["UndefinedElasticityWarning"],
         "runners.sensitivity.request": [
             "GroupedFactorError",

@@ -13,6 +13,7 @@ from .model.errors import DeprecatedNameWarning as DeprecatedNameWarning
 from .model.errors import DirectNoiseError as DirectNoiseError
 from .model.errors import ExtrapolationWarning as ExtrapolationWarning
 from .model.errors import IntegrationError as IntegrationError
+from .model.errors import MissingLibraryError as MissingLibraryError
 from .model.errors import ModeError as ModeError
 from .model.errors import NonlinearSystemError as NonlinearSystemError
 from .model.errors import NotPicklableError as NotPicklableError
@@ -34,7 +35,6 @@ from .model.errors import WindWarning as WindWarning
 from .model.vehicle.noise_loads import NoiseLoadsWarning as NoiseLoadsWarning
 from .model.wind.correlation_matrix import NotPositiveSemidefiniteError as NotPositiveSemidefiniteError
 from .model.wind.correlation_matrix import RepairWarning as RepairWarning
-from .model.wind.soundings.grids import MissingLibraryError as MissingLibraryError
 from .model.wind.soundings.sounding import SoundingError as SoundingError
 from .runners.design.design import InfeasibleDesignError as InfeasibleDesignError
 from .runners.design.problem import DesignProblemError as DesignProblemError
@@ -48,6 +48,7 @@ from .runners.gusts.shapes import GustError as GustError
 from .runners.parameter_study.cluster import SchedulerError as SchedulerError
 from .runners.parameter_study.sampling import UnbalancedSampleWarning as UnbalancedSampleWarning
 from .runners.parameter_study.store import ResumeError as ResumeError
+from .runners.report.folder import ResultsFolderError as ResultsFolderError
 from .runners.sensitivity.one import UndefinedElasticityWarning as UndefinedElasticityWarning
 from .runners.sensitivity.request import GroupedFactorError as GroupedFactorError
 from .runners.sensitivity.request import NotAParameterError as NotAParameterError

@@ -62,6 +62,10 @@ class DataError(AscentwindError):
         super().__init__(f"{', '.join(where)}: {why}" if where else why)
 
 
+class MissingLibraryError(DataError):
+    """A file or a page needs a library that is not installed."""
+
+
 class SeveralDataErrors(DataError):
     """Several things that cannot be used, told together; the place is that of the first.
 

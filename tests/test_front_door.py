@@ -39,6 +39,7 @@ EXAMPLES = {
     "NotAParameterError": lambda: errors.NotAParameterError("mass"),
     "NotPositiveSemidefiniteError": lambda: errors.NotPositiveSemidefiniteError("has a negative root", row=2),
     "PlanesError": lambda: errors.PlanesError("a design wind", "as504"),
+    "ResultsFolderError": lambda: errors.ResultsFolderError("holds no results", file=Path("found")),
     "SeveralDataErrors": lambda: errors.SeveralDataErrors([errors.DataError("is odd", row=3), errors.DataError("too")]),
     "SoundingError": lambda: errors.SoundingError("is odd", file=Path("s.csv"), row=3, sounding="7", altitude=500.0),
     "StepBudgetError": lambda: errors.StepBudgetError(10, "t = 12 s", time=12.0, fastest="-900, slosh 1"),

@@ -12,7 +12,7 @@ from rich.logging import RichHandler
 from rich.text import Text
 
 from ...model.errors import AscentwindError, AscentwindWarning
-from ..present.terminal import errors
+from ..present.terminal import errors, warned
 from .commands import LazyGroup
 from .terminal import use_plain_characters
 
@@ -39,6 +39,7 @@ def ascentwind(
 def main() -> None:
     """Run the command line; errors that ascentwind raises on purpose end with their sentence and exit code 2."""
     use_plain_characters()
+    warned.clear()
     logging.basicConfig(
         level=logging.INFO,
         format="%(message)s",
@@ -61,6 +62,7 @@ def _show_warning(
     line: str | None = None,
 ) -> None:
     if issubclass(category, AscentwindWarning):
+        warned.append(str(message))
         errors.print(Text.assemble(("warning:", "yellow"), f" {message}"), soft_wrap=True)
     else:
         sys.stderr.write(warnings.formatwarning(message, category, filename, lineno, line))

@@ -76,7 +76,7 @@ def availability(
             limits, months=names, azimuths=angles, winds=winds, window=flown, check_hours=check_hours,
             threshold=threshold, sides=chosen, draws=draws, seed=seed,
         )  # fmt: skip
-    job.replace_earlier("availability", study.system.name)
+    job.replace_earlier("availability", study)
     kept = ["probability", "lower", "upper", *(["stopped", "remaining_risk"] if check_hours is not None else [])]
     rows = [",".join(["month", "azimuth_deg", *kept])]
     for month in found["month"].values:

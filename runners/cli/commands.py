@@ -24,6 +24,7 @@ FILES = {  # command: its file in this folder, where a function or a group of th
     "equations": "views",
     "export": "export",
     "study": "study",
+    "report": "report",
     "design": "design",
     "vehicles": "vehicles",
     "new-vehicle": "vehicles",

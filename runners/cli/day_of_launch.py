@@ -75,7 +75,7 @@ def day_of_launch(
         )  # fmt: skip
         title = study.vehicle_for("a day of launch").title
         page = launch_page(launch, title)
-    job.replace_earlier("day-of-launch", study.system.name)
+    job.replace_earlier("day-of-launch", study)
     found = launch.to_dataset()
     units = [str(unit) for unit in found["unit"].values]
     whole_file = one_unit_a_variable(found.drop_vars("unit"), {"response": units}, words={})

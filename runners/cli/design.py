@@ -39,7 +39,7 @@ def design(
         status.update("recomputing peaks by CVODES")
         recomputed = recompute_peaks(found)
     print_design(found, recomputed, console)
-    job.replace_earlier("design", loaded.problem.study.system.name)
+    job.replace_earlier("design", loaded.problem.study)
     job.written += write_design(found, job.folder)
     if trades and loaded.trade is not None:
         points = {}

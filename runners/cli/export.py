@@ -44,11 +44,11 @@ def export(
     if format == C:
         with console.status("statistics, and the sources of the library"):
             texts = c_library(study, chosen)
-        job.replace_earlier("export", study.system.name)
+        job.replace_earlier("export", study)
         job.written += write_texts(texts, job.folder)
     else:
         with console.status("matrices"):
             grid = study.matrix_grid(chosen)
-        job.replace_earlier("export", study.system.name)
+        job.replace_earlier("export", study)
         job.written += write_matrices(grid, format, job.folder, study.system.name)
     job.end()

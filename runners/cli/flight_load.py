@@ -110,7 +110,7 @@ def flight_load(
         with console.status("limits together"):
             passage = study.limit_passage(limits, flown, asked[0], sides=chosen, draws=2 * draws, seed=seed)
             _ = passage.probability, passage.factor
-    job.replace_earlier("flight-load", study.system.name)
+    job.replace_earlier("flight-load", study)
     job.written += write_flight_loads(loads, job.folder)
     if passage is not None:
         job.written += write_passage(passage, job.folder)

@@ -54,7 +54,7 @@ def fly(
     with console.status("flying"):
         flown = study.fly(read, ends, responses=names, component=component, sign=sign)
         _ = flown.predicted_maxima
-    job.replace_earlier("fly", study.system.name)
+    job.replace_earlier("fly", study)
     job.written += write_flown(flown, job.folder)
     title = study.vehicle_for("a flown wind").title
     for name in names:

@@ -70,7 +70,7 @@ def gust(
             _ = sweep.dataset
             sheets.append(combined_loads(sweep))
             bar.done(words(sweep.gust.name))
-    job.replace_earlier("gust", study.system.name)
+    job.replace_earlier("gust", study)
     job.written += write_gusts(sweeps, sheets, job.folder)
     with console.status("figures"):
         for name in (n for n in sweeps[0].responses if any(sweep.worst(n).value for sweep in sweeps)):

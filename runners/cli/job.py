@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shlex
+import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from rich.progress import Progress
 
 from ...model.errors import UnknownNameError, UnusedOptionError
-from ..present.terminal import console, progress_bar
+from ..present.terminal import console, progress_bar, warned
 from .terminal import parse_changes
 
 if TYPE_CHECKING:
@@ -119,18 +121,29 @@ class Job:
         prepare_folder(folder)
         self.folder = folder
         self.written: list[Path] = []
+        self.notes: list[str] = []  # what people are told beside the tables, kept for a report
         self.manifest: Manifest | None = None
 
-    def replace_earlier(self, command: str, of: str) -> None:
+    def replace_earlier(self, command: str, of: Study | str) -> None:
         """Say in the folder's manifest that what an earlier run of a command wrote is about to be replaced.
+
+        Parameters
+        ----------
+        command : str
+        of : Study or str
+            The study, or the name of what is no vehicle.
 
         Raises
         ------
         OutputFolderError
         """
+        from ..case.description import description
         from ..present.manifest import Manifest
 
-        self.manifest = Manifest.begin(self.folder, command, of)
+        about, name = {"typed": typed()}, of
+        if not isinstance(of, str):
+            about, name = about | description(of), of.system.name
+        self.manifest = Manifest.begin(self.folder, command, str(name), about)
 
     def end(self) -> None:
         """Print what was written and where, and what became of an earlier run's files.
@@ -140,8 +153,16 @@ class Job:
         OutputFolderError
         """
         print_files(self.written, self.folder)
-        for sentence in self.manifest.finish(self.written) if self.manifest else ():
+        if self.manifest is None:
+            return
+        self.manifest.about |= {"notes": self.notes, "warnings": list(dict.fromkeys(warned))}
+        for sentence in self.manifest.finish(self.written):
             console.print(sentence, style="dim", soft_wrap=True, markup=False)
+
+
+def typed() -> str:
+    """Return the command as it was typed, for a shell."""
+    return shlex.join(["ascentwind", *sys.argv[1:]])
 
 
 def print_files(written: Iterable[Path], folder: Path) -> None:

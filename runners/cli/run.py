@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.table import Table
 
-from ...model.errors import AscentwindError, UnusedOptionError
+from ...model.errors import AscentwindError, OutputFolderError, UnusedOptionError
 from ..present.terminal import console, errors, print_table
+from ..statistics.larger_side import LARGER_SIDE
 from .flight_load import print_levels
 from .job import SHOWN, Job, load_study, steps
+from .report import write_report
 from .system import run_system
 from .terminal import Changes, OptionalVehicle, Turbulence, number, parse_changes, results_folder
 
@@ -56,6 +58,9 @@ def run(
         Path | None,
         typer.Option(help="A system of one's own in the place of a vehicle: the TOML file of its matrices."),
     ] = None,
+    report: Annotated[
+        bool, typer.Option("--report", help="Sensitivities and exceedance too, and all of it as one HTML page.")
+    ] = False,
 ) -> None:
     """Mean, variance and |mean| + 3 sigma of all responses over flight time: tables and figures.
 
@@ -63,6 +68,10 @@ def run(
     """
     if vehicle is None and system is None:
         raise typer.BadParameter("name a vehicle, or a system of one's own with --system FILE.toml")
+    if report:
+        from ..report.library import checked_libraries
+
+        checked_libraries()
     from ...model.equations.stated_twice import compare_stated_twice
     from ...model.vehicle.planes import BOTH
     from ..case.times import parse_times
@@ -89,7 +98,9 @@ def run(
             "VEHICLE": vehicle, "--set": changes, "--turbulence": turbulence, "--azimuths": azimuths,
             "--along-vehicle": along_vehicle,
         }  # fmt: skip
-        run_system(system, times, out, engine_from(engine, **settings), tuple(chances), of_vehicle)
+        folder = run_system(system, times, out, engine_from(engine, **settings), tuple(chances), of_vehicle)
+        if report:
+            write_report(folder)
         return
     assert vehicle is not None
     turns = checked_azimuths(parse_times(azimuths)) if azimuths else []
@@ -114,7 +125,7 @@ def run(
     if chances:
         statistics = statistics.with_percentiles(chances)
     both = statistics.resultants((LIKE_3_SIGMA, *chances)) if has_resultants(statistics.dataset) else None
-    job.replace_earlier("run", study.system.name)
+    job.replace_earlier("run", study)
     job.written += statistics.save(job.folder)
     if both is not None:
         job.written += both.save(job.folder)
@@ -173,30 +184,60 @@ def run(
         _print_along(along)
     top = min(mean.argument[-1] for mean in flown.wind.means)
     if study.tables(end_times[-1])["altitude"] > top:
-        console.print(f"Above {top / 1000:g} km the wind tables end and their last values are held.", style="dim")
-    job.end()
+        job.notes.append(f"Above {top / 1000:g} km the wind tables end and their last values are held.")
+        console.print(job.notes[-1], style="dim")
+    if report:
+        _compute_for_report(study, loads, job)
     agree = check is not None and check.agree
+    delays = _check_delays(study, check) if flown.zones is not None and check is not None else None
+    if delays is not None:
+        job.notes.append(delays[0])
+        agree = agree and delays[1]
+    job.end()
     if check is not None:
-        console.print(
-            check.verdict(), style="green" if agree else "bold red", markup=False, highlight=False, soft_wrap=True
-        )
-    if flown.zones is not None and check is not None:
-        agree = _check_delays(study, check) and agree
+        _print_verdict(check.verdict(), check.agree)
+    if delays is not None:
+        _print_verdict(*delays)
+    if report:
+        write_report(job.folder)
     if not agree:
         raise typer.Exit(1)
 
 
-def _check_delays(study: Study, check: PeakCheck) -> bool:
-    """Hold rational delays of gusts against exact ones at the first response's peak; say it and whether they agree."""
+def _compute_for_report(study: Study, loads: list[FlightLoad], job: Job) -> None:
+    """Write what a report shows beside a run: exceedance, and sensitivities of the first response at its peak."""
+    from ..flight_load.files import write_flight_loads
+    from ..sensitivity.report import write_sensitivity
+
+    with steps("for the report", 2) as bar:
+        try:
+            if loads:
+                bar.done("exceedance")
+                job.written += write_flight_loads(loads, job.folder)
+            bar.done("sensitivities")
+            found = study.sensitivity(study.system.output_names[0], "peak", quantity=LARGER_SIDE)
+            job.written += write_sensitivity(found, job.folder)
+        except OutputFolderError:
+            raise
+        except AscentwindError as error:
+            text = f"Not all for the report could be computed, all else stands: {error}"
+            job.notes.append(text)
+            errors.print(text, style="bold red", markup=False, highlight=False, soft_wrap=True)
+
+
+def _print_verdict(text: str, good: bool) -> None:
+    console.print(text, style="green" if good else "bold red", markup=False, highlight=False, soft_wrap=True)
+
+
+def _check_delays(study: Study, check: PeakCheck) -> tuple[str, bool]:
+    """Hold rational delays of gusts against exact ones at the first response's peak: a sentence, and if they agree."""
     from ..statistics.exact_penetration import verdict
 
     try:
         with console.status("gusts with exact delays"):
-            text, agree = verdict(study.check_gust_penetration(check.peaks[0].time))
+            return verdict(study.check_gust_penetration(check.peaks[0].time))
     except AscentwindError as error:
-        text, agree = f"The delays of gusts along the vehicle stand unchecked: {error}", False
-    console.print(text, style="green" if agree else "bold red", markup=False, highlight=False, soft_wrap=True)
-    return agree
+        return f"The delays of gusts along the vehicle stand unchecked: {error}", False
 
 
 def _check_peaks(study: Study, statistics: ResponseStatistics) -> PeakCheck | None:

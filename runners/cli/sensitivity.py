@@ -44,6 +44,6 @@ def sensitivity(
     with console.status("finding the peak and differentiating" if at == "peak" else "differentiating"):
         found = study.sensitivity(asked.response, at, source=source, quantity=quantity)
     print_sensitivity(found, console)
-    job.replace_earlier("sensitivity", study.system.name)
+    job.replace_earlier("sensitivity", study)
     job.written += write_sensitivity(found, job.folder)
     job.end()

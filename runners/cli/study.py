@@ -9,7 +9,7 @@ import typer
 
 from ..present.terminal import console, errors
 from .exit_codes import INTERRUPTED
-from .job import load_study, print_files, steps
+from .job import Job, load_study, steps
 
 
 def study(
@@ -43,8 +43,10 @@ def study(
 
             result = run_parameter_study(file, folder, study=loaded, scheduler=scheduler, progress=advance)
         with console.status("first-order prediction and figures"):
-            written = [folder / "study.nc", *report(result, folder, console)]
+            job = Job(folder)
+            job.replace_earlier("study", loaded)
+            job.written += [folder / "study.nc", *report(result, folder, console)]
     except KeyboardInterrupt:
         errors.print(f"stopped; members done are stored in {folder}: run the same command again to go on from there")
         raise typer.Exit(INTERRUPTED) from None
-    print_files(written, folder)
+    job.end()

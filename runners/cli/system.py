@@ -23,7 +23,7 @@ TIMES = 100  # where neither the file nor --times names any
 def run_system(
     file: Path, times: str | None, out: Path | None, engine: Engine | None, chances: tuple[float, ...],
     unused: Mapping[str, object],
-) -> None:  # fmt: skip
+) -> Path:  # fmt: skip
     """Compute the statistics of a system that a TOML file describes.
 
     Parameters
@@ -36,6 +36,11 @@ def run_system(
         Probabilities of levels at an instant.
     unused : mapping of option to value
         What only a vehicle knows, and is refused where it was typed.
+
+    Returns
+    -------
+    Path
+        The folder of the results.
 
     Raises
     ------
@@ -63,7 +68,7 @@ def run_system(
         statistics = study.response_statistics(ends, engine=engine, progress=lambda t: bar.done(f"end time {t:g} s"))
     if chances:
         statistics = statistics.with_percentiles(chances)
-    job.replace_earlier("run", study.system.name)
+    job.replace_earlier("run", study)
     job.written += statistics.save(job.folder)
     with steps("figures", len(study.system.outputs)) as bar:
         for output in study.system.outputs:
@@ -72,6 +77,7 @@ def run_system(
             bar.done()
     _print_peaks(statistics)
     job.end()
+    return job.folder
 
 
 def _print_peaks(statistics: ResponseStatistics) -> None:

@@ -418,6 +418,7 @@ def plot(
         "interval_9km": interval_figure(s, covariance),
         "standard_deviation": deviation_figure(s, fit_deviation(s.altitude[1:], s.standard_deviation[1:])),
     }
+    job.replace_earlier("wind-plot", shaping_filter.name)
     for name, figure in figures.items():
         job.written += write_figure(figure, out, name)
     job.end()

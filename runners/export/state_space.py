@@ -7,8 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ...model.errors import UnknownNameError
-from ...model.wind.soundings.grids import MissingLibraryError
+from ...model.errors import MissingLibraryError, UnknownNameError
 from ..case.case import Case
 from ..solvers.stability import matrices_at
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ from ...model.files.folder_files import file_inside
 from .files import write_text
 
 MANIFEST = "manifest.json"
+PAGE = "report"  # the command whose file shows what the others wrote
 RESULTS = (".nc", ".csv", ".png", ".svg")
 
 
@@ -29,22 +30,24 @@ class Manifest:
         Each command has its own list: several may write to one folder.
     of : str
         The vehicle or system computed.
+    about : mapping, optional
+        What else a reader is told of it, such as the command as it was typed; goes into JSON.
     """
 
-    def __init__(self, folder: Path, command: str, of: str):
-        self.folder, self.command, self.of = folder, command, of
-        self.commands = _read(folder)
+    def __init__(self, folder: Path, command: str, of: str, about: Mapping[str, object] | None = None):
+        self.folder, self.command, self.of, self.about = folder, command, of, dict(about or {})
+        self.commands = read_manifest(folder)
         self.earlier: dict[str, str] = dict(self.commands.get(command, {}).get("files", {}))
 
     @classmethod
-    def begin(cls, folder: Path, command: str, of: str) -> Manifest:
+    def begin(cls, folder: Path, command: str, of: str, about: Mapping[str, object] | None = None) -> Manifest:
         """Say that the files of an earlier run are about to be replaced.
 
         Raises
         ------
         OutputFolderError
         """
-        manifest = cls(folder, command, of)
+        manifest = cls(folder, command, of, about)
         manifest._write(False, manifest.earlier)
         return manifest
 
@@ -60,19 +63,26 @@ class Manifest:
         ------
         OutputFolderError
         """
-        files = {path.name: _hash(path) for path in written}
+        files = {path.name: file_hash(path) for path in written}
         removed, kept = [], []
         for name, digest in self.earlier.items():
-            path = _own(self.folder, name)
+            path = own_file(self.folder, name)
             if name in files or path is None:
                 continue
-            if _hash(path) == digest:
+            if file_hash(path) == digest:
                 path.unlink()
                 removed.append(name)
             else:
                 kept.append(name)
         self._write(True, files)
-        return [*_sentence("removed, of an earlier run", removed), *_sentence("not of this run", kept + self._others())]
+        stale = [n for n in self.commands.get(PAGE, {}).get("files", {}) if own_file(self.folder, n) is not None]
+        return [
+            *_sentence("removed, of an earlier run", removed),
+            *_sentence("not of this run", kept + self._others()),
+            *_sentence(
+                "of the results before; 'ascentwind report' writes it anew", stale if self.command != PAGE else []
+            ),
+        ]
 
     def _others(self) -> list[str]:
         """Return results in the folder that no command's list holds."""
@@ -82,12 +92,12 @@ class Manifest:
 
     def _write(self, complete: bool, files: dict[str, str]) -> None:
         entry = {"of": self.of, "ascentwind": version("ascentwind"), "complete": complete, "files": files}
-        self.commands[self.command] = entry
+        self.commands[self.command] = entry | ({"about": self.about} if self.about else {})
         text = json.dumps(self.commands, indent=1, ensure_ascii=False) + "\n"
         write_text(self.folder / MANIFEST, text)
 
 
-def _read(folder: Path) -> dict[str, dict[str, Any]]:
+def read_manifest(folder: Path) -> dict[str, dict[str, Any]]:
     """Return the manifest of a folder by command; what cannot be read as one counts as none."""
     try:
         found = json.loads(file_inside(folder, MANIFEST).read_text(encoding="utf-8"))
@@ -99,7 +109,7 @@ def _read(folder: Path) -> dict[str, dict[str, Any]]:
         return {}
 
 
-def _own(folder: Path, name: str) -> Path | None:
+def own_file(folder: Path, name: str) -> Path | None:
     """Return a file of the folder itself that a manifest names, if it is there."""
     path = folder / name
     if Path(name).name != name or path.is_symlink() or not path.is_file():
@@ -107,7 +117,8 @@ def _own(folder: Path, name: str) -> Path | None:
     return path
 
 
-def _hash(path: Path) -> str:
+def file_hash(path: Path) -> str:
+    """Return the SHA-256 of a file."""
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 

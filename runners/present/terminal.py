@@ -14,6 +14,9 @@ console = Console(emoji=False, markup=False)
 errors = Console(stderr=True, emoji=False, markup=False)
 
 
+warned: list[str] = []  # warnings that the command under way has printed
+
+
 WIDEST = 1000  # columns
 EDGES = 3  # of a column: a space on either side and a line
 

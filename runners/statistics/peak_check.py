@@ -179,7 +179,8 @@ def with_peak_check(statistics: ResponseStatistics, check: PeakCheck, case: Case
             noise_source=("noise", [n.source for n in noises]),
             input=list(case.system.input_names),
         )
-    return ResponseStatistics(dataset.assign(variables).assign_attrs(peak_reference=check.reference))
+    said = {"peak_reference": check.reference, "peak_verdict": check.verdict(), "peaks_agree": int(check.agree)}
+    return ResponseStatistics(dataset.assign(variables).assign_attrs(**said))
 
 
 def _weighting(check: PeakCheck, case: Case) -> dict[str, tuple]:

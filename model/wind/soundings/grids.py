@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from ...errors import DataError
+from ...errors import MissingLibraryError
 from .igra import Wanted
 from .quality import Quality
 from .raw_levels import RawLevels
@@ -35,10 +35,6 @@ GEOPOTENTIAL_UNITS = ("m**2 s**-2", "m2 s-2", "m2/s2", "m^2 s^-2")
 HEIGHT_UNITS = ("m", "gpm")
 CALENDARS = ("standard", "gregorian", "proleptic_gregorian")
 GRIB, HDF5, CLASSIC = b"GRIB", b"\x89HDF", b"CDF"
-
-
-class MissingLibraryError(DataError):
-    """A file needs a library that is not installed."""
 
 
 def is_grid(start: bytes) -> bool:

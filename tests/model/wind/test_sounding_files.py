@@ -13,10 +13,10 @@ import sounding_files as files
 import xarray as xr
 from sounding_files import real_file
 
+from ascentwind.errors import MissingLibraryError
 from ascentwind.model.errors import DataError, UnknownNameError
 from ascentwind.model.wind.correlation_matrix import RepairWarning
 from ascentwind.model.wind.soundings.collection import soundings_text, successive_correlation
-from ascentwind.model.wind.soundings.grids import MissingLibraryError
 from ascentwind.model.wind.soundings.read import read_profiles, read_soundings
 from ascentwind.model.wind.soundings.sounding import SoundingError, hypsometric_heights, wind_components
 
