@@ -20,7 +20,7 @@ __getattr__, __dir__, __all__ = _lazy.attach(
         "runners.flight_load.limit_table": ["Limits"],
         "runners.flight_load.load": ["FlightLoad"],
         "runners.gusts.shapes": ["OneMinusCosine", "QuasiSquare", "RampAndHold"],
-        "runners.measured_winds.persistence": ["Persistence"],
+        "runners.measured_winds.persistence": ["ComponentPersistence", "Persistence"],
         "runners.parameter_study.run": ["run_parameter_study"],
         "runners.statistics.covariance": ["CovarianceEquation"],
         "runners.statistics.cvodes": ["Cvodes"],

@@ -12,6 +12,7 @@ from .runners.flight_load.load import FlightLoad as FlightLoad
 from .runners.gusts.shapes import OneMinusCosine as OneMinusCosine
 from .runners.gusts.shapes import QuasiSquare as QuasiSquare
 from .runners.gusts.shapes import RampAndHold as RampAndHold
+from .runners.measured_winds.persistence import ComponentPersistence as ComponentPersistence
 from .runners.measured_winds.persistence import Persistence as Persistence
 from .runners.parameter_study.run import run_parameter_study as run_parameter_study
 from .runners.statistics.covariance import CovarianceEquation as CovarianceEquation

@@ -169,21 +169,21 @@ class TableGroup:
         knots = np.unique(np.concatenate([[start], inner[(inner > start) & (inner < end)], [end]]))
         keep = np.concatenate([[True], np.diff(knots) > 1e-9 * max(1.0, abs(end))])
         knots = knots[keep]
-        middle = 0.5 * (knots[:-1] + knots[1:])
-        columns = []
-        for _, _, p in polynomials:
-            column = taylor_coefficients(p, knots[:-1], middle)[::-1].T
-            for outside, end_value in ((middle < p.x[0], p(p.x[0])), (middle > p.x[-1], p(p.x[-1]))):
-                column[outside] = [float(end_value), 0.0, 0.0, 0.0]
-            columns.append(column)
         return TableGroup(
             name,
             argument,
             tuple(n for n, _, _ in polynomials),
             tuple(u for _, u, _ in polynomials),
             knots,
-            np.stack(columns, axis=2),
+            np.stack([_column(p, knots) for _, _, p in polynomials], axis=2),
         )
+
+    def with_polynomials(self, polynomials: Mapping[str, PPoly]) -> TableGroup:
+        """Return the group with some of its tables replaced on its own knots, which hold theirs; others pass over."""
+        coefficients = self.coefficients.copy()
+        for name in polynomials.keys() & set(self.names):
+            coefficients[:, :, self.names.index(name)] = _column(polynomials[name], self.knots)
+        return replace(self, coefficients=coefficients)
 
     def scaled(self, factors: Mapping[str, float]) -> TableGroup:
         """Return the group with some of its tables multiplied; names of other groups' tables are passed over."""
@@ -224,3 +224,13 @@ def table_values(groups: Sequence[TableGroup], time: float) -> dict[str, float]:
 def run_time_vector(groups: Sequence[TableGroup]) -> NDArray[np.float64]:
     """Return all groups as one run-time vector."""
     return np.concatenate([np.zeros(0), *(g.run_time_vector() for g in groups)])
+
+
+def _column(polynomial: PPoly, knots: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return a polynomial's coefficients on knots that hold its own, (k - 1, 4), held beyond its ends."""
+    middle = 0.5 * (knots[:-1] + knots[1:])
+    column = taylor_coefficients(polynomial, knots[:-1], middle)[::-1].T
+    first, last = polynomial.x[0], polynomial.x[-1]
+    for outside, end in ((middle < first, first), (middle > last, last)):
+        column[outside] = [float(polynomial(end)), 0.0, 0.0, 0.0]
+    return column

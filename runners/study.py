@@ -32,10 +32,9 @@ from .gusts.shapes import Gust, OneMinusCosine
 from .measured_winds.availability import availability
 from .measured_winds.day_of_launch import ERROR, THRESHOLD, Balloon, DayOfLaunch, day_of_launch
 from .measured_winds.fly import FlownWinds, fly
-from .measured_winds.persistence import Persistence
+from .measured_winds.met_winds import met_winds
 from .measured_winds.predictor import predict_wind
-from .measured_winds.profiles import across
-from .measured_winds.wind_field import measured_persistence, wind_field
+from .measured_winds.wind_field import Lasting, measured_persistence, wind_field
 from .sensitivity.check import check_sensitivity
 from .sensitivity.many import sensitivities
 from .sensitivity.one import sensitivity
@@ -590,7 +589,8 @@ class Study(Case):
         Returns
         -------
         FlownWinds
-            ``histories``, ``percentiles()``, ``maxima``, ``worst(response)``, ``normality``.
+            ``histories``, ``percentiles()``, ``maxima``, ``worst(response)``, ``normality``; in both planes
+            ``resultants``.
 
         Raises
         ------
@@ -653,7 +653,7 @@ class Study(Case):
         limits: str | Path | Limits | None = None,
         window: tuple[float, float] | None = None,
         responses: Iterable[str] | None = None,
-        persistence: Persistence | None = None,
+        persistence: Lasting | None = None,
         error: float = ERROR,
         threshold: float = THRESHOLD,
         sides: Sides = "both",
@@ -676,9 +676,9 @@ class Study(Case):
             As for :meth:`flight_load`, s.
         responses : iterable of str, optional
             Those with a limit without it, or all.
-        persistence : Persistence, optional
-            By wavelength and lag; without it the correlation after 24 h is that measured at Cape Canaveral in March,
-            and how it grows at shorter lags and falls for shorter waves is assumed.
+        persistence : Persistence or ComponentPersistence, optional
+            By wavelength and lag, of both components alike or of each; without it the correlation after 24 h is that
+            measured at Cape Canaveral in March; how it grows at shorter lags and falls for shorter waves is assumed.
         error : float
             Standard deviation of a measured wind, m/s, independent by level.
         threshold : float
@@ -694,7 +694,8 @@ class Study(Case):
         Returns
         -------
         DayOfLaunch
-            ``mean``, ``std`` (time, response), ``wind``, ``probability``, ``go``, ``margin_in_sigmas()``, ``update``.
+            ``mean``, ``std`` (time, response), ``wind``, ``probability``, ``go``, ``margin_in_sigmas()``, ``update``;
+            in both planes ``law(resultant)``.
 
         Raises
         ------
@@ -769,7 +770,7 @@ class Study(Case):
         altitude : (k,) array_like
             Where it was measured, increasing, m.
         wind : (k,) array_like
-            Along the vehicle's +Y, m/s.
+            Along the vehicle's +Y, m/s; where it flies in both planes (k, 2), towards the east and towards the north.
         ahead : (j,) array_like
             Altitudes above the last one, increasing, m.
         error : float
@@ -779,7 +780,7 @@ class Study(Case):
         -------
         xarray.Dataset
             ``predicted``, ``std`` and ``band`` (ahead); ``one_step`` (altitude) from the levels below each, and the
-            ``gain`` (altitude, state).
+            ``gain`` (altitude, state); in both planes of each ``component``.
 
         Raises
         ------
@@ -787,7 +788,7 @@ class Study(Case):
         """
         return predict_wind(self, altitude, wind, ahead, error)
 
-    def persistence(self, soundings: Soundings, component: str | None = None) -> Persistence:
+    def persistence(self, soundings: Soundings, component: str | None = None) -> Lasting:
         """Return how long winds last by one's own soundings, for :meth:`day_of_launch`.
 
         Parameters
@@ -795,19 +796,20 @@ class Study(Case):
         soundings : Soundings
             With hours in their dates; pairs of any lag up to 48 h, 20 at least.
         component : {'zonal', 'meridional'}, optional
-            That across the flight without it.
+            That across the flight without it; none where the vehicle flies in both planes.
 
         Returns
         -------
-        Persistence
+        Persistence or ComponentPersistence
+            Of the component across the flight, or of both.
 
         Raises
         ------
         NoVehicleError, SoundingError, ParameterValueError, DataError, UnknownNameError
         """
-        which, _ = across(self, component, 1)
+        met = met_winds(self, component, 1)
         top = float(Climb.of(self).altitude(checked_window(self, None)[1]))
-        return measured_persistence(wind_field(self, top), soundings, which)
+        return measured_persistence(wind_field(self, top), soundings, met.components)
 
     def sensitivity(
         self,

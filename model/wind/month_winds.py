@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -74,6 +75,11 @@ class MonthWind:
             return scaled[0]
         start = self.start_correlation * float(np.sign(weights[0] * weights[1]))
         return add_filters(scaled[0], scaled[1], self.noise_correlation, start)
+
+    @cached_property
+    def joint(self) -> ShapingFilter:
+        """The states and noises of both components in one filter, the zonal ones first."""
+        return add_filters(self.zonal, self.meridional, self.noise_correlation, self.start_correlation)
 
     def text(self) -> str:
         """Return it as JSON, with eight digits."""

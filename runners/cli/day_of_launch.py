@@ -77,8 +77,11 @@ def day_of_launch(
         page = launch_page(launch, title)
     job.replace_earlier("day-of-launch", study)
     found = launch.to_dataset()
-    units = [str(unit) for unit in found["unit"].values]
-    whole_file = one_unit_a_variable(found.drop_vars("unit"), {"response": units}, words={})
+    units = {"response": found["unit"].values.tolist()}
+    if launch.resultants:
+        units["resultant"] = found["resultant_unit"].values.tolist()
+    bare = found.drop_vars(["unit", "resultant_unit"], errors="ignore")
+    whole_file = one_unit_a_variable(bare, units, words={})
     job.written.append(write_netcdf(with_conventions(whole_file), job.folder / "day_of_launch.nc"))
     job.written.append(write_text(job.folder / "day_of_launch.md", page))
     job.written += write_figure(launch_figure(launch, title), job.folder, "day_of_launch")

@@ -43,6 +43,7 @@ def fly(
     from ..measured_winds.files import write_flown
     from ..measured_winds.flown_figure import flown_figure
     from ..present.style import words, write_figure
+    from ..statistics.resultants import resultant_pairs
 
     if component is None:
         refuse_unused(context, ["sign"], "without --component")
@@ -57,19 +58,20 @@ def fly(
     job.replace_earlier("fly", study)
     job.written += write_flown(flown, job.folder)
     title = study.vehicle_for("a flown wind").title
-    for name in names:
-        job.written += write_figure(flown_figure(flown, name, title), job.folder, f"flown_{name}")
+    parts = [flown, flown.resultants] if resultant_pairs(names) else [flown]
+    for part in parts:
+        for name in part.responses:
+            job.written += write_figure(flown_figure(part, name, title), job.folder, f"flown_{name}")
     for line in read.quality.lines():
         console.print(line, style="dim", soft_wrap=True, highlight=False, markup=False)
     print_flown(flown)
-    for name in names[:1]:
-        table = Table("profile", "date", title=f"Largest {words(name)}")
-        for column in ("value", "time, s"):
-            table.add_column(column, justify="right")
-        unit = study.system.outputs[study.system.output_index(name)].unit
-        for profile, date, value, time in flown.worst(name, SHOWN):
-            table.add_row(profile, date, f"{value:.4g} {unit}", f"{time:g}")
-        print_table(table, console)
+    last, name = parts[-1], parts[-1].responses[0]
+    table = Table("profile", "date", title=f"Largest {words(name)}")
+    for column in ("value", "time, s"):
+        table.add_column(column, justify="right")
+    for profile, date, value, time in last.worst(name, SHOWN):
+        table.add_row(profile, date, f"{value:.4g} {last.unit(name)}", f"{time:g}")
+    print_table(table, console)
     job.end()
 
 
@@ -78,20 +80,20 @@ def print_flown(flown: FlownWinds) -> None:
     import numpy as np
 
     from ..present.style import display, words
+    from ..statistics.resultants import resultant_pairs
 
     n = len(flown.values)
     drawn = "" if len(flown.completed) == n else ", what was not measured drawn"
     table = Table("response", title=f"Largest size over the flight: {n} profiles{drawn} / Gaussian wind")
     for column in ("median", "95 %", "99 %", "largest"):
         table.add_column(column, justify="right", no_wrap=True)
-    for r, name in enumerate(flown.responses):
-        unit = flown.case.system.outputs[flown.case.system.output_index(name)].unit
-        measured, predicted = flown.maxima[:, r], flown.predicted_maxima[:, r]
-        factor, shown = display(unit, measured)
-        cells = [
-            " / ".join(f"{factor * np.quantile(x, p):.4g}" for x in (measured, predicted)) for p in (0.5, 0.95, 0.99)
-        ]
-        table.add_row(words(name), *cells, f"{factor * np.abs(flown.values[:, :, r]).max():.4g} {shown}")
+    for part in [flown, flown.resultants] if resultant_pairs(flown.responses) else [flown]:
+        for r, name in enumerate(part.responses):
+            measured, predicted = part.maxima[:, r], part.predicted_maxima[:, r]
+            factor, shown = display(part.unit(name), measured)
+            both = [[f"{factor * np.quantile(x, p):.4g}" for x in (measured, predicted)] for p in (0.5, 0.95, 0.99)]
+            largest = f"{factor * np.abs(part.values[:, :, r]).max():.4g} {shown}"
+            table.add_row(words(name), *(" / ".join(pair) for pair in both), largest)
     print_table(table, console)
     missed = flown.missed_share.max(axis=0)
     console.print(

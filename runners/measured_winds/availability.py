@@ -1,17 +1,17 @@
 """How often a month lets a vehicle fly: the chance that a flight passes its limits, by month and launch azimuth.
 
 The wind across the flight path towards azimuth Az is u cos Az - v sin Az in the yaw plane, positive to the right, and
-along the heading, u sin Az + v cos Az, in the pitch plane, which takes its own part of it. Its covariance is quadratic
-in the two weights, and goes into the responses by the weights of the levels. What deviations of the vehicle do goes
-with its mean response, so that every month and azimuth has its own mean. A check on the day of launch is simulated: of
-days drawn from the season some are stopped, those whose chance of passing given a sounding lies above the threshold.
+along the heading, u sin Az + v cos Az, in the pitch plane, which takes its own part of it. In both planes a flight that
+is turned by d meets the wind (u cos d - v sin d, u sin d + v cos d) as it would u and v. What u and v do at each level
+follows from what the winds that are met do, and their joint covariance of the month makes the responses' own. What
+deviations of the vehicle do goes with its mean response, so that every month and azimuth has its own mean. A check on
+the day of launch is simulated: of days drawn from the season some are stopped, those whose chance of passing given a
+sounding lies above the threshold.
 """
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,13 +20,12 @@ from numpy.typing import NDArray
 from scipy.stats import chi2, norm
 
 from ...codegen.system.evaluation import MatrixEvaluator
-from ...model.errors import AscentwindWarning, ParameterValueError
+from ...model.errors import ParameterValueError
 from ...model.system.names import WIND
 from ...model.tables import Table
-from ...model.vehicle.planes import one_wind
 from ...model.wind.month_winds import MonthWind, read_months
-from ...model.wind.shaping_filter import ShapingFilter
-from ...model.wind.two_components import plane_weights
+from ...model.wind.record import COMPONENTS
+from ...model.wind.two_components import TwoComponentWind, plane_weights
 from ..case.case import Case
 from ..case.climb import Climb
 from ..case.provenance import provenance
@@ -38,10 +37,12 @@ from ..flight_load.request import checked_draws
 from ..flight_load.window import checked_window, window_chain
 from ..solvers.markov_chain import MarkovChain
 from ..solvers.time_nodes import interval_before
+from ..statistics.norm import NormOfNormal
 from ..statistics.percentiles import Sides, checked_sides, instant_level
+from ..statistics.resultants import resultant_pairs
 from .conditioning import Measured
 from .day_of_launch import ERROR, worth_while
-from .level_weights import level_weights
+from .level_weights import WINDS, level_weights
 from .random_wind import RandomWind, filter_wind
 from .wind_field import WindField, default_persistence
 
@@ -82,16 +83,9 @@ def availability(
     for name, unit in zip(names, units, strict=True):
         table.of(name, unit, np.array(flown))
     vehicle = case.vehicle_for("the availability of months")
-    record = one_wind(vehicle, "the availability of months").record
-    if azimuths is None:
-        if record is None:
-            raise ParameterValueError("the vehicle does not state its azimuth; give azimuths")
-        azimuths = [record.azimuth]
-    angles = np.array([float(a) for a in azimuths])
-    if not angles.size or not np.isfinite(angles).all():
-        raise ParameterValueError("azimuths are finite numbers, rad from north towards east")
-    weights = [plane_weights(float(a), vehicle.file.planes) for a in angles]
+    angles, turns = _turns(case, azimuths)
     seasons = read_months(None if winds is None else Path(winds), None if months is None else list(months))
+    pairs = resultant_pairs(names)
 
     levels = _levels(case, flown, seasons)
     at = [case.system.output_index(name) for name in names]
@@ -100,48 +94,55 @@ def availability(
     others = [k for k, source in enumerate(case.system.sources) if source != WIND]
     limit = np.stack([table.of(n, u, times)[:, 0] for n, u in zip(names, units, strict=True)], axis=1)
     shape = (len(seasons), angles.size)
-    found = {key: np.full(shape, np.nan) for key in ("probability", "lower", "upper", "standard_error")}
+    found = {
+        key: np.full(shape, np.nan) for key in ("probability", "lower", "upper", "standard_error", "spacing_error")
+    }
     found |= {key: np.full(shape, np.nan) for key in ("stopped", "remaining_risk")}
-    level = np.full((*shape, len(names)), np.nan)
+    level = np.full((*shape, len(names) + len(pairs)), np.nan)
     for i, month in enumerate(seasons):
-        winds_of = [_wind(month, w, levels).covariance for w in ((1.0, 0.0), (0.0, 1.0), (1.0, 1.0))]
-        R = [winds_of[0], winds_of[1], winds_of[2] - winds_of[0] - winds_of[1]]
-        A = by_level.weight[::COARSE]
-        variances = [np.einsum("mrk,mrk->mr", A @ part, A) for part in R]
-        for j, (wu, wv) in enumerate(weights):
-            chain = window_chain(_in_mean(case, month, (wu, wv)), flown, STEPS)
-            row = chain.output[::COARSE][:, at]
-            own_variance = np.einsum("mri,mij,mrj->mr", row, chain.covariance(others)[::COARSE], row, optimize=True)
-            wind = np.maximum(wu**2 * variances[0] + wv**2 * variances[1] + wu * wv * variances[2], 0.0)
-            mean, bound = chain.mean[:, at], limit[::COARSE]
+        field = WindField(_wind(month, levels))
+        for j, turn in enumerate(turns):
+            chain = window_chain(_in_mean(case, month, turn), flown, STEPS)
+            weight = np.einsum("mrck,cd->mrdk", by_level.weight.reshape(times.size, len(names), len(turn), -1), turn)
+            weight = weight.reshape(times.size, len(names), -1)
+            row, coarse, bound = chain.output[::COARSE][:, at], weight[::COARSE], limit[::COARSE]
+            own_covariance = row @ chain.covariance(others)[::COARSE] @ row.swapaxes(1, 2)
+            by_wind = (coarse @ field.wind.covariance) @ coarse.swapaxes(1, 2)
+            mean = chain.mean[:, at]
+            wind, own_variance = (np.maximum(np.einsum("mrr->mr", c), 0.0) for c in (by_wind, own_covariance))
             std = np.sqrt(wind + own_variance)
             first, last = (COARSE * k for k in worth_while(mean[::COARSE], std, bound, chosen))
             fine = np.arange(first, last + 1, max(1, -(-(last - first) // MOST)))
             part = chain.part(slice(first, last + 1))
             own = joint_covariance(part, part.output[:, at], others)[fine - first][:, :, fine - first]
-            F = by_level.weight[fine].reshape(fine.size * len(names), -1)
-            covariance = (F @ (wu**2 * R[0] + wv**2 * R[1] + wu * wv * R[2]) @ F.T).reshape(own.shape) + own
-            rough = _diffusion(case, month.filter_along((wu, wv)), part, fine - first, at, others)
+            F = weight[fine].reshape(fine.size * len(names), -1)
+            covariance = (F @ field.wind.covariance @ F.T).reshape(own.shape) + own
+            rough = _diffusion(case, month, turn, part, fine - first, at, others)
             process = JointOutputs(Grid(chain.times[fine], mean[fine], rough), covariance)
             loads = [LimitedLoad(n, u) for n, u in zip(names, units, strict=True)]
             p = Passage(case, loads, process, limit[fine], chosen, DESIGN, draws, seed).probability
             found["probability"][i, j], found["standard_error"][i, j] = p.value, p.standard_error
+            found["spacing_error"][i, j] = p.spacing_error
             low, high = _interval(mean[::COARSE], wind, own_variance, bound, chosen, month.independent_samples)
             found["lower"][i, j], found["upper"][i, j] = min(1.0, p.value * low), min(1.0, p.value * high)
-            level[i, j] = instant_level(mean[::COARSE], std, DESIGN, chosen).max(axis=0)
+            level[i, j, : len(names)] = instant_level(mean[::COARSE], std, DESIGN, chosen).max(axis=0)
+            for k, pair in enumerate(pairs.values(), start=len(names)):
+                two = [names.index(name) for name in pair]
+                both = (by_wind + own_covariance)[:, two][:, :, two]
+                level[i, j, k] = NormOfNormal(mean[::COARSE][:, two], both).percentile(DESIGN).max()
             if check_hours is not None:
                 some = fine[:: max(1, fine.size // CHECK_POINTS)]
                 which = np.searchsorted(fine, some)
                 found["stopped"][i, j], found["remaining_risk"][i, j] = _checked(
-                    WindField(_wind(month, (wu, wv), levels)), by_level.weight[some], mean[some],
-                    covariance[which][:, :, which], limit[some], chosen, check_hours, threshold,
-                    "zonal" if abs(wu) > abs(wv) else "meridional", seed,
+                    field, weight[some], mean[some], covariance[which][:, :, which], limit[some], chosen, check_hours,
+                    threshold, seed,
                 )  # fmt: skip
     meanings = {
         "probability": "of passing any limit in a flight",
         "lower": "lower end of its 90 % interval, by the statistics' own sampling",
         "upper": "upper end of it",
         "standard_error": "of the importance sampling",
+        "spacing_error": "relative: what the grid of times still misses, estimated from half as many points",
         "stopped": "share of days that a check on the day of launch stops",
         "remaining_risk": "of passing any limit on the days that it lets go",
     }
@@ -159,8 +160,8 @@ def availability(
         {
             "month": [season.period for season in seasons],
             "azimuth": ("azimuth", angles, {"units": "rad", "long_name": "of the launch, from north towards east"}),
-            "response": names,
-            "unit": ("response", units),
+            "response": [*names, *pairs],
+            "unit": ("response", [*units, *(units[names.index(first)] for first, _ in pairs.values())]),
         },
         provenance(case)
         | {
@@ -182,46 +183,76 @@ def _levels(case: Case, window: tuple[float, float], seasons: Sequence[MonthWind
     return np.linspace(first, max(top, first + 10 * SPACING), max(11, int(np.ceil((top - first) / SPACING)) + 1))
 
 
-def _wind(month: MonthWind, weights: tuple[float, float], levels: NDArray[np.float64]) -> RandomWind:
-    return filter_wind(month.filter_along(weights), levels, month.mean_along(weights, levels))
+def _turns(case: Case, azimuths: Iterable[float] | None) -> tuple[NDArray[np.float64], list[NDArray[np.float64]]]:
+    """Return launch azimuths (rad), and for each what the winds that are met are of u and v, (c, 2)."""
+    vehicle = case.vehicle_for("the availability of months")
+    both = isinstance(vehicle.wind, TwoComponentWind)
+    record = vehicle.wind.record
+    if both:
+        own = case.parameters["wind.azimuth"].value
+    elif record is not None:
+        own = record.azimuth
+    elif azimuths is None:
+        raise ParameterValueError("the vehicle does not state its azimuth; give azimuths")
+    else:
+        own = 0.0
+    angles = np.array([own] if azimuths is None else [float(a) for a in azimuths])
+    if not angles.size or not np.isfinite(angles).all():
+        raise ParameterValueError("azimuths are finite numbers, rad from north towards east")
+    if not both:
+        return angles, [np.array([plane_weights(float(a), vehicle.file.planes)]) for a in angles]
+    for a in angles:
+        plane_weights(float(a), "yaw")
+    turned = [(np.cos(a - own), np.sin(a - own)) for a in angles]
+    return angles, [np.array([[c, -s], [s, c]]) for c, s in turned]
 
 
-def _in_mean(case: Case, month: MonthWind, weights: tuple[float, float]) -> Case:
-    """Return a case whose mean wind is a month's: what deviations of the vehicle do goes with its mean response."""
-    wind = one_wind(case.vehicle_for("the availability of months"), "the availability of months")
-    old = wind.mean
-    mean = Table(old.name, old.unit, old.argument, month.mean_along(weights, old.argument), old.interpolation)
-    with warnings.catch_warnings():
-        warnings.simplefilter(
-            "ignore", AscentwindWarning
-        )  # of winds that end below the flight, known since it was loaded
-        return case.with_wind(replace(wind, mean=mean, standard_deviation=None, record=None))
+def _wind(month: MonthWind, levels: NDArray[np.float64]) -> RandomWind:
+    """Return u and v of a month at levels (m)."""
+    mean = np.concatenate([month.mean_along(weights, levels) for weights in ((1.0, 0.0), (0.0, 1.0))])
+    zonal = np.arange(month.joint.order) < month.zonal.order
+    return filter_wind(month.joint, levels, mean, np.array([zonal, ~zonal], float))
+
+
+def _in_mean(case: Case, month: MonthWind, turn: NDArray[np.float64]) -> Case:
+    """Return a case whose mean winds are a month's: what deviations of the vehicle do goes with its mean response."""
+    polynomials = {}
+    for old, (wu, wv) in zip(case.vehicle_for("the availability of months").wind.means, turn, strict=True):
+        values = month.mean_along((wu, wv), old.argument)
+        polynomials[old.name] = Table(old.name, old.unit, old.argument, values, old.interpolation).polynomial
+    executable = case.executable
+    groups = tuple(group.with_polynomials(polynomials) for group in executable.groups)
+    return Case(executable.with_numbers(groups=groups), case.vehicle)
 
 
 def _diffusion(
     case: Case,
-    shaping_filter: ShapingFilter,
+    month: MonthWind,
+    turn: NDArray[np.float64],
     part: MarkovChain,
     picked: NDArray[np.intp],
     rows: list[int],
     others: list[int],
 ) -> NDArray[np.float64]:
     """Return what white noise does to outputs directly, that of the month's wind and of the vehicle, (m, r)."""
-    climb, times = Climb.of(case), part.times[picked]
-    altitude = climb.altitude(times)
-    held = np.clip(altitude, shaping_filter.altitude[0], shaping_filter.altitude[-1])
-    _, G, H = shaping_filter.at(held)
-    roughness = np.sqrt(np.maximum((np.einsum("kn,knm->km", H, G) ** 2).sum(axis=1) * climb.polynomial(times, 1), 0.0))
-    evaluate, wind = MatrixEvaluator(case.with_means, ("G",)), case.system.input_names.index(WIND)
+    climb, times, joint = Climb.of(case), part.times[picked], month.joint
+    held = np.clip(climb.altitude(times), joint.altitude[0], joint.altitude[-1])
+    _, G, H = joint.at(held)
+    first = month.zonal.order
+    by_noise = np.stack([H[:, None, :first] @ G[:, :first], H[:, None, first:] @ G[:, first:]], axis=1)[:, :, 0]
+    by_noise *= np.sqrt(np.maximum(climb.polynomial(times, 1), 0.0))[:, None, None]  # of u and v, (m, 2, noises)
+    evaluate = MatrixEvaluator(case.with_means, ("G",))
+    winds = [i for i, name in enumerate(case.system.input_names) if name in WINDS]
     through = []
     for time in times.tolist():
         here = interval_before(case.with_means, time) if time > case.system.start else None
         low, high = (time, time) if here is None else (here.low, here.high)
-        through.append(evaluate(time, low, high)[0][rows, wind])
-    by_wind = np.array(through) * roughness[:, None]
+        through.append(evaluate(time, low, high)[0][np.ix_(rows, winds)] @ turn)
     direct = part.output[picked][:, rows] @ part.acting_noise_matrix(others)[picked]
-    size = np.sqrt(by_wind**2 + (direct**2).sum(axis=2))
-    return np.where(by_wind < 0, -size, size)
+    whole = np.concatenate([np.array(through) @ by_noise, direct], axis=2)
+    size = np.sqrt((whole**2).sum(axis=2))
+    largest = np.take_along_axis(whole, np.abs(whole).argmax(axis=2)[..., None], axis=2)[..., 0]
+    return np.copysign(size, largest)
 
 
 def _interval(
@@ -261,16 +292,14 @@ def _checked(
     sides: Sides,
     hours: float,
     threshold: float,
-    component: str,
     seed: int,
 ) -> tuple[float, float]:
     """Return the share of days that a check stops, and the chance of passing on the others, by drawn days."""
     random, (m, r, _) = np.random.default_rng([seed, 12]), weight.shape
     altitude = np.arange(field.levels[0] + BALLOON, field.levels[-1], BALLOON)
-    rows = field.rows(altitude)
-    persistence = default_persistence(field, component)
-    now = rows * persistence.correlation(field.wavelengths, hours)
-    K = Measured(rows @ rows.T + ERROR**2 * np.eye(altitude.size))
+    rows = np.concatenate([field.rows(altitude, component) for component in range(2)])
+    now = rows * field.kept(default_persistence(field, COMPONENTS), hours)
+    K = Measured(rows @ rows.T + ERROR**2 * np.eye(len(rows)))
     gain = K.whitened((field.waves @ now.T).T @ weight.reshape(m * r, -1).T)
     left = covariance.reshape(m * r, m * r) - gain.T @ gain
     size = np.sqrt(np.maximum(np.diagonal(left), 0.0))
@@ -278,7 +307,7 @@ def _checked(
     values, vectors = np.linalg.eigh(left / np.outer(unit, unit))
     root = size[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
     flights = random.standard_normal((PATHS, m * r)) @ root.T
-    days = mean.ravel() + random.standard_normal((DAYS, altitude.size)) @ gain
+    days = mean.ravel() + random.standard_normal((DAYS, len(rows))) @ gain
     bound, chance = limit.ravel(), np.empty(DAYS)
     for k, day in enumerate(days):
         beyond = np.zeros(PATHS, bool)

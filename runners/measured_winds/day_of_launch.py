@@ -24,7 +24,7 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-from ...model.errors import ParameterValueError
+from ...model.errors import ParameterValueError, UnknownNameError
 from ...model.wind.soundings.collection import Soundings
 from ...model.wind.soundings.read import read_profiles
 from ...model.wind.soundings.sounding import Sounding, SoundingError
@@ -38,12 +38,14 @@ from ..flight_load.process import Grid, JointOutputs, joint_covariance
 from ..flight_load.request import checked_draws
 from ..flight_load.window import checked_window, window_chain
 from ..present.netcdf import RULE
+from ..statistics.norm import NormOfNormal
 from ..statistics.percentiles import Sides, checked_sides
+from ..statistics.resultants import resultant_pairs
 from .conditioning import Measured
 from .level_weights import LevelWeights, level_weights
-from .persistence import Persistence
-from .profiles import across
-from .wind_field import WindField, default_persistence, wind_field
+from .met_winds import MetWinds, met_winds
+from .persistence import ComponentPersistence, Persistence
+from .wind_field import Lasting, WindField, default_persistence, wind_field
 
 STEPS, FINER = 240, 10  # of the window, and of each for the chance of passing a limit
 LEFT_OUT = 2e-3  # of the instants' chances, at either end
@@ -66,7 +68,9 @@ class Balloons:
     altitude : (k,) array
         Of all measurements, m.
     wind : (k,) array
-        Along +Y, m/s.
+        As the vehicle meets it, m/s.
+    component : (k,) array of int
+        Which of the winds that it meets.
     hours : (k,) array
         Before launch.
     names : tuple of str
@@ -75,6 +79,7 @@ class Balloons:
 
     altitude: NDArray[np.float64]
     wind: NDArray[np.float64]
+    component: NDArray[np.intp]
     hours: NDArray[np.float64]
     names: tuple[str, ...]
 
@@ -91,8 +96,8 @@ class Flight:
     weights : LevelWeights
         Of the responses at the field's levels.
     mean : (m, r) array
-    std : (m, r) array
-        Of all sources.
+    covariance : (m, r, r) array
+        Of all sources, at each time.
     window : (float, float)
         s.
     """
@@ -102,12 +107,17 @@ class Flight:
     field: WindField
     weights: LevelWeights
     mean: NDArray[np.float64]
-    std: NDArray[np.float64]
+    covariance: NDArray[np.float64]
     window: tuple[float, float]
 
     @cached_property
+    def std(self) -> NDArray[np.float64]:
+        """Of the responses, (m, r)."""
+        return np.sqrt(np.maximum(np.einsum("mrr->mr", self.covariance), 0.0))
+
+    @cached_property
     def by_wave(self) -> NDArray[np.float64]:
-        """Responses to each wave of the wind, (m, r, N)."""
+        """Responses to each wave of the wind, (m, r, c N)."""
         return self.weights.weight @ self.field.waves
 
     def fine(self, names: tuple[str, ...], first: int, last: int) -> FinePart:
@@ -134,7 +144,7 @@ class FinePart:
     ----------
     times : (m,) array
         s.
-    weight : (m, r, N) array
+    weight : (m, r, c N) array
         Of the wind at the field's levels.
     mean, diffusion : (m, r) arrays
     covariance : (m, r, m, r) array
@@ -156,7 +166,7 @@ class DayOfLaunch:
     ----------
     flight : Flight
     balloons : Balloons
-    persistence : Persistence
+    persistence : Persistence or ComponentPersistence
     error : float
         Standard deviation of a measured wind's error, m/s, independent from level to level.
     limits : Limits or None
@@ -164,22 +174,20 @@ class DayOfLaunch:
         Probability of passing a limit above which it is no-go.
     sides : {'both', 'upper', 'lower'}
     draws, seed : int
-    component : str
-        Across the flight.
-    sign : {1, -1}
+    met : MetWinds
+        What of a balloon's wind the vehicle meets.
     """
 
     flight: Flight
     balloons: Balloons
-    persistence: Persistence
+    persistence: Lasting
     error: float
     limits: Limits | None
     threshold: float
     sides: Sides
     draws: int
     seed: int
-    component: str
-    sign: int
+    met: MetWinds
 
     @property
     def times(self) -> NDArray[np.float64]:
@@ -193,32 +201,41 @@ class DayOfLaunch:
 
     @cached_property
     def _rows(self) -> NDArray[np.float64]:
-        return self.flight.field.rows(self.balloons.altitude)
+        """Measurements by each wave when they were made, (k, c N)."""
+        field, balloons = self.flight.field, self.balloons
+        rows = np.empty((balloons.altitude.size, field.waves.shape[0]))
+        for number in range(field.components):
+            at = balloons.component == number
+            rows[at] = field.rows(balloons.altitude[at], number)
+        return rows
 
     @cached_property
     def _seen_now(self) -> NDArray[np.float64]:
-        """Measurements by each wave at launch, (k, N): faded by their lag."""
-        waves, hours = self.flight.field.wavelengths, self.balloons.hours
-        rho = {h: self.persistence.correlation(waves, h) for h in np.unique(hours).tolist()}
+        """Measurements by each wave at launch, (k, c N): faded by their lag."""
+        hours = self.balloons.hours
+        rho = {h: self.flight.field.kept(self.persistence, h) for h in np.unique(hours).tolist()}
         return self._rows * np.array([rho[h] for h in hours.tolist()])
 
     @cached_property
     def measured(self) -> Measured:
         """The covariance K of all measurements."""
-        hours, waves = self.balloons.hours, self.flight.field.wavelengths
+        hours = self.balloons.hours
         K = np.zeros((hours.size, hours.size))
         times = np.unique(hours).tolist()
         for a in times:
             for b in times:
                 i, j = hours == a, hours == b
-                rho = self.persistence.correlation(waves, abs(a - b))
+                rho = self.flight.field.kept(self.persistence, abs(a - b))
                 K[np.ix_(i, j)] = (self._rows[i] * rho) @ self._rows[j].T
         return Measured(K + self.error**2 * np.eye(hours.size))
 
     @cached_property
     def _deviation(self) -> NDArray[np.float64]:
         """What was measured less the mean wind there, whitened, (k,)."""
-        mean = np.interp(self.balloons.altitude, self.flight.field.levels, self.flight.field.wind.mean)
+        mean = np.empty(self.balloons.wind.size)
+        for number in range(self.flight.field.components):
+            at = self.balloons.component == number
+            mean[at] = self.flight.field.mean_at(self.balloons.altitude[at], number)
         return self.measured.whitened(self.balloons.wind - mean)
 
     @cached_property
@@ -233,28 +250,74 @@ class DayOfLaunch:
         return self.flight.mean + (self._deviation @ self._gain).reshape(self.flight.mean.shape)
 
     @cached_property
+    def covariance(self) -> NDArray[np.float64]:
+        """Of the responses at each time given the measurements, all sources, (m, r, r)."""
+        gain = self._gain.reshape(-1, *self.flight.mean.shape).transpose(1, 2, 0)
+        return self.flight.covariance - gain @ gain.swapaxes(1, 2)
+
+    @cached_property
     def std(self) -> NDArray[np.float64]:
         """Standard deviation of the responses given the measurements, all sources, (m, r)."""
-        taken = (self._gain**2).sum(axis=0).reshape(self.flight.mean.shape)
-        return np.sqrt(np.maximum(self.flight.std**2 - taken, 0.0))
+        return np.sqrt(np.maximum(np.einsum("mrr->mr", self.covariance), 0.0))
+
+    @property
+    def resultants(self) -> tuple[str, ...]:
+        """Names of the norms of responses of both planes; none in one plane."""
+        return tuple(resultant_pairs(self.responses))
+
+    def law(self, resultant: str, climatology: bool = False) -> NormOfNormal:
+        """Return the law of a resultant at each time given the measurements.
+
+        Parameters
+        ----------
+        resultant : str
+        climatology : bool
+            Of the season instead.
+
+        Returns
+        -------
+        NormOfNormal
+            ``percentile(probability)`` is the level passed at each instant.
+
+        Raises
+        ------
+        UnknownNameError
+        """
+        pairs = resultant_pairs(self.responses)
+        if resultant not in pairs:
+            raise UnknownNameError("resultant", resultant, pairs)
+        at = [self.responses.index(name) for name in pairs[resultant]]
+        of = self.flight if climatology else self
+        return NormOfNormal(of.mean[:, at], of.covariance[:, at][:, :, at])
 
     @cached_property
     def wind(self) -> xr.Dataset:
-        """The wind at launch over (altitude): ``mean``, ``std`` given the measurements, ``climatology`` and its std."""
+        """The wind at launch over (altitude), and of both planes over (component, altitude).
+
+        ``mean`` and ``std`` given the measurements, ``climatology`` and its std.
+        """
         field = self.flight.field
         gain = self.measured.whitened(self._seen_now @ field.waves.T)
-        mean = field.wind.mean + self._deviation @ gain
-        std = np.sqrt(np.maximum(field.wind.std**2 - (gain**2).sum(axis=0), 0.0))
-        speed = {"units": "m/s"}
-        return xr.Dataset(
+        parts = {
+            "mean": (field.wind.mean + self._deviation @ gain, "wind expected at launch"),
+            "std": (np.sqrt(np.maximum(field.wind.std**2 - (gain**2).sum(axis=0), 0.0)), "its standard deviation"),
+            "climatology": (field.wind.mean, "mean wind of the season"),
+            "climatological_std": (field.wind.std, "its standard deviation"),
+        }
+        found = xr.Dataset(
             {
-                "mean": ("altitude", mean, speed | {"long_name": "wind expected at launch"}),
-                "std": ("altitude", std, speed | {"long_name": "its standard deviation"}),
-                "climatology": ("altitude", field.wind.mean, speed | {"long_name": "mean wind of the season"}),
-                "climatological_std": ("altitude", field.wind.std, speed | {"long_name": "its standard deviation"}),
+                name: (
+                    ("component", "altitude"), values.reshape(field.components, -1),
+                    {"units": "m/s", "long_name": text},
+                )
+                for name, (values, text) in parts.items()
             },
-            {"altitude": ("altitude", field.levels, {"units": "m", "long_name": "altitude"})},
-        )
+            {
+                "component": list(self.met.components),
+                "altitude": ("altitude", field.levels, {"units": "m", "long_name": "altitude"}),
+            },
+        )  # fmt: skip
+        return found if self.met.both else found.isel(component=0, drop=True)
 
     def limit(self) -> NDArray[np.float64]:
         """Return the limits of the responses that have one, NaN elsewhere, (m, r)."""
@@ -314,17 +377,19 @@ class DayOfLaunch:
         ------
         SoundingError, DataError, ParameterValueError
         """
-        new = _balloons(self.flight, [(sounding, hours_before)], self.component, self.sign, self.error)
+        new = _balloons(self.flight, [(sounding, hours_before)], self.met, self.error)
         both = (self.balloons, new)
-        parts = [np.concatenate([getattr(b, name) for b in both]) for name in ("altitude", "wind", "hours")]
+        parts = [
+            np.concatenate([getattr(b, name) for b in both]) for name in ("altitude", "wind", "component", "hours")
+        ]
         return replace(self, balloons=Balloons(*parts, names=self.balloons.names + new.names))
 
-    def with_persistence(self, persistence: Persistence) -> DayOfLaunch:
+    def with_persistence(self, persistence: Lasting) -> DayOfLaunch:
         """Return the same with another persistence.
 
         Parameters
         ----------
-        persistence : Persistence
+        persistence : Persistence or ComponentPersistence
 
         Returns
         -------
@@ -333,7 +398,7 @@ class DayOfLaunch:
         return replace(self, persistence=persistence)
 
     def to_dataset(self) -> xr.Dataset:
-        """Return means, deviations, limits and margins over (time, response).
+        """Return means, deviations, limits and margins over (time, response), and levels of resultants of both planes.
 
         Returns
         -------
@@ -358,12 +423,25 @@ class DayOfLaunch:
             | {
                 "balloons": "; ".join(self.balloons.names),
                 "persistence": self.persistence.source,
-                "persistence_hours": self.persistence.hours,
-                "persistence_exponent": self.persistence.exponent,
+                "persistence_hours": [part.hours for part in self.persistence.parts],
+                "persistence_exponent": [part.exponent for part in self.persistence.parts],
                 "error_m_s": self.error,
                 "condition_of_measurements": self.measured.condition,
             },
         )
+        if self.resultants:
+            found = found.assign_coords(
+                resultant=list(self.resultants),
+                resultant_unit=(
+                    "resultant", [self._unit(pair[0]) for pair in resultant_pairs(self.responses).values()]
+                ),
+            )  # fmt: skip
+            for name, season, text in (
+                ("resultant_level", False, "level passed with 0.00135 at the instant, given the measurements"),
+                ("climatological_resultant_level", True, "the same of the season"),
+            ):
+                levels = [self.law(resultant, season).percentile() for resultant in self.resultants]
+                found[name] = (("time", "resultant"), np.array(levels).T, {RULE: "resultant", "long_name": text})
         found["margin_in_sigmas"] = (dims, self.margin_in_sigmas(), {"units": "1", "long_name": "margin to the limit"})
         return found
 
@@ -428,7 +506,7 @@ def day_of_launch(
     limits: str | Path | Limits | None,
     window: tuple[float, float] | None,
     responses: Iterable[str] | None,
-    persistence: Persistence | None,
+    persistence: Lasting | None,
     error: float,
     threshold: float,
     sides: Sides,
@@ -457,15 +535,19 @@ def day_of_launch(
     hours = list(hours_before) if isinstance(hours_before, Sequence) else [hours_before]
     if len(balloons) != len(hours):
         raise ParameterValueError(f"{len(balloons)} soundings and {len(hours)} times before launch; give one each")
-    which, direction = across(case, component, sign)
+    met = met_winds(case, component, sign)
     flight = _flight(case, tuple(names), flown)
-    found = _balloons(flight, list(zip(balloons, hours, strict=True)), which, direction, error)
+    found = _balloons(flight, list(zip(balloons, hours, strict=True)), met, error)
     lasting = persistence
     if lasting is None:
-        lasting = case.kept(("persistence", flown, which), lambda: default_persistence(flight.field, which))
-    return DayOfLaunch(
-        flight, found, lasting, float(error), table, threshold, checked_sides(sides), draws, seed, which, direction
-    )
+        lasting = case.kept(("persistence", flown, met), lambda: default_persistence(flight.field, met.components))
+    if met.both and isinstance(lasting, Persistence):
+        lasting = ComponentPersistence(lasting, lasting)
+    if not met.both and isinstance(lasting, ComponentPersistence):
+        raise ParameterValueError(
+            f"the vehicle meets the {met.components[0]} wind alone; give the Persistence of that component"
+        )
+    return DayOfLaunch(flight, found, lasting, float(error), table, threshold, checked_sides(sides), draws, seed, met)
 
 
 def _flight(case: Case, names: tuple[str, ...], window: tuple[float, float]) -> Flight:
@@ -475,49 +557,46 @@ def _flight(case: Case, names: tuple[str, ...], window: tuple[float, float]) -> 
         field = wind_field(case, float(Climb.of(case).altitude(window[1])))
         weights = level_weights(case, chain.times.tolist(), field.levels, names)
         row = chain.output[:, at]
-        variance = np.einsum("mri,mij,mrj->mr", row, chain.covariance(), row, optimize=True)
-        return Flight(case, names, field, weights, chain.mean[:, at], np.sqrt(np.maximum(variance, 0.0)), window)
+        covariance = row @ chain.covariance() @ row.swapaxes(1, 2)
+        return Flight(case, names, field, weights, chain.mean[:, at], covariance, window)
 
     return case.kept(("day of launch", names, window), made)
 
 
-def _balloons(
-    flight: Flight, given: Sequence[tuple[Balloon, float]], component: str, sign: int, error: float
-) -> Balloons:
-    levels, field = flight.field.levels, flight.field
-    altitude, wind, hours, names = [], [], [], []
+def _balloons(flight: Flight, given: Sequence[tuple[Balloon, float]], met: MetWinds, error: float) -> Balloons:
+    levels, parts, names = flight.field.levels, [], []
     for balloon, before in given:
         if isinstance(before, bool) or not isinstance(before, int | float) or not 0 <= before < np.inf:
             raise ParameterValueError(f"a sounding {before!r} h before launch; give hours of 0 or more")
         sounding = _one(balloon)
-        h, w = sounding.altitude, sign * (sounding.u if component == "zonal" else sounding.v)
-        inside = (h >= levels[0]) & (h <= levels[-1])
-        if not inside.any():
+        h = sounding.altitude
+        inside = np.flatnonzero((h >= levels[0]) & (h <= levels[-1]))
+        if not inside.size:
             span = f"{h[0]:g} to {h[-1]:g} m" if h.size else "no level"
             raise SoundingError(
                 f"holds {span}, and the flight goes from {levels[0]:.0f} to {levels[-1]:.0f} m; give one that is there",
                 file=sounding.file or None, sounding=sounding.name,
             )  # fmt: skip
-        h, w = h[inside], w[inside]
-        kept = [0]
-        for k in range(1, h.size):
+        kept = [inside[0]]
+        for k in inside[1:]:
             if h[k] - h[kept[-1]] >= NEAREST:
                 kept.append(k)
-        h, w = h[kept], w[kept]
-        mean, std = np.interp(h, levels, field.wind.mean), np.interp(h, levels, field.wind.std)
-        far = np.abs(w - mean) / np.hypot(std, error)
-        if far.max() > FARTHEST:
-            k = int(far.argmax())
-            raise SoundingError(
-                f"{w[k]:.3g} m/s across the flight is {far[k]:.1f} standard deviations from the mean of the vehicle's "
-                f"wind, {mean[k]:.3g} m/s: is it in knots, or of another season or place?",
-                file=sounding.file or None, sounding=sounding.name, altitude=float(h[k]),
-            )  # fmt: skip
-        altitude.append(h)
-        wind.append(w)
-        hours.append(np.full(h.size, float(before)))
+        h = h[kept]
+        for number, (name, whole) in enumerate(zip(met.components, met.of(sounding), strict=True)):
+            wind = whole[kept]
+            mean, std = flight.field.mean_at(h, number), flight.field.std_at(h, number)
+            far = np.abs(wind - mean) / np.hypot(std, error)
+            if far.max() > FARTHEST:
+                k = int(far.argmax())
+                which = f"{name} wind" if met.both else "wind"
+                raise SoundingError(
+                    f"{wind[k]:.3g} m/s {'' if met.both else 'across the flight '}is {far[k]:.1f} standard deviations "
+                    f"from the mean of the vehicle's {which}, {mean[k]:.3g} m/s: is it in knots, or of another season "
+                    "or place?", file=sounding.file or None, sounding=sounding.name, altitude=float(h[k]),
+                )  # fmt: skip
+            parts.append((h, wind, np.full(h.size, number), np.full(h.size, float(before))))
         names.append(f"{sounding.name}, {before:g} h before")
-    return Balloons(np.concatenate(altitude), np.concatenate(wind), np.concatenate(hours), tuple(names))
+    return Balloons(*(np.concatenate(column) for column in zip(*parts, strict=True)), names=tuple(names))
 
 
 def _one(balloon: Balloon) -> Sounding:
@@ -539,9 +618,3 @@ def _one(balloon: Balloon) -> Sounding:
             "read_profiles(file)[0][-1]", file=balloon,
         )  # fmt: skip
     return found[0]
-
-
-def wind_share(flight: Flight) -> NDArray[np.float64]:
-    """Return the share of the random wind in the variance of the responses, (m, r)."""
-    by_wind = (flight.by_wave**2).sum(axis=2)
-    return np.divide(by_wind, flight.std**2, out=np.zeros_like(by_wind), where=flight.std > 0)

@@ -5,22 +5,23 @@ from __future__ import annotations
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
-from scipy.special import ndtri
 
 from ..present.style import COLORS, SHADES, STYLE, display, words, wrapped
+from .flown_resultants import FlownResultants
 from .fly import FlownWinds
 
 MOST = 400  # histories drawn
 BAND = 0.99
 
 
-def flown_figure(flown: FlownWinds, response: str, title: str) -> Figure:
+def flown_figure(flown: FlownWinds | FlownResultants, response: str, title: str) -> Figure:
     """Return histories of all profiles over time, the worst with its date, and the chance that a flight passes a level.
 
     Parameters
     ----------
-    flown : FlownWinds
+    flown : FlownWinds or FlownResultants
     response : str
+        One of its.
     title : str
 
     Returns
@@ -28,22 +29,26 @@ def flown_figure(flown: FlownWinds, response: str, title: str) -> Figure:
     matplotlib.figure.Figure
     """
     r = flown.responses.index(response)
-    values, times = flown.values[:, :, r], flown.weights.times
-    mean, std = flown.predicted_mean[:, r], flown.predicted_std[:, r]
-    unit = flown.case.system.outputs[flown.case.system.output_index(response)].unit
-    factor, unit = display(unit, values)
-    k = float(ndtri(0.5 + BAND / 2))
+    values, times = flown.values[:, :, r], flown.times
+    factor, unit = display(flown.unit(response), values)
+    tail = 0.5 * (1 - BAND)
+    low, middle, high = flown.percentiles([tail, 0.5, 1 - tail])["predicted"].isel(response=r).values
     with rc_context(STYLE):
         figure = Figure(figsize=(8.0, 8.0), layout="constrained")
         above, below = figure.subplots(2)
-        band = factor * (mean - k * std), factor * (mean + k * std)
         above.fill_between(
-            times, *band, color=COLORS["wind"], alpha=0.18, lw=0, label=f"holds {BAND:.0%} by prediction"
+            times,
+            factor * low,
+            factor * high,
+            color=COLORS["wind"],
+            alpha=0.18,
+            lw=0,
+            label=f"holds {BAND:.0%} by prediction",
         )
         strength = max(0.12, min(0.8, 20.0 / len(values)))
         for i in np.linspace(0, len(values) - 1, min(len(values), MOST)).astype(int):
             above.plot(times, factor * values[i], color="#555555", lw=0.6, alpha=strength)
-        above.plot(times, factor * mean, color="black", lw=1.4, label="mean by prediction")
+        above.plot(times, factor * middle, color="black", lw=1.4, label="median by prediction")
         if len(values) > 1:
             above.plot(
                 times, factor * values.mean(axis=0), "--", color=COLORS["combined"], lw=1.6, label="mean of profiles"

@@ -12,8 +12,9 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
+from ...model.errors import PlanesError
 from ...model.system.names import WIND
-from ...model.wind.soundings.collection import Soundings, independent_samples
+from ...model.wind.soundings.collection import Soundings
 from ...model.wind.soundings.normality import FEWEST, Normality, normality, skewed_level
 from ...model.wind.soundings.sounding import Sounding
 from ..case.case import Case
@@ -23,14 +24,17 @@ from ..case.times import end_times, parse_times
 from ..present.netcdf import RULE
 from ..solvers.discretisation import symmetric_root
 from ..statistics.engines import response_statistics
+from ..statistics.resultants import resultant_pairs
+from .flown_resultants import FlownResultants
 from .level_weights import LevelWeights, level_weights
+from .met_winds import met_winds
+from .profile_statistics import independent_profiles, profile_percentiles, worst_profiles
 from .profiles import CompleteProfiles, complete_profiles, soundings_of
 from .random_wind import random_wind
 
 PERCENTILES = (0.01, 0.05, 0.5, 0.95, 0.99)
 COMPLETED = 2000  # histories at least, where part of the winds is drawn
 PATHS = 4000  # drawn, for the Gaussian wind's flight maxima
-CONFIDENCE = 0.95
 SIGMAS = 3.0  # of the level that skewness and kurtosis are told at
 
 
@@ -54,6 +58,11 @@ class FlownWinds:
     profiles: CompleteProfiles
     weights: LevelWeights
     day: NDArray[np.float64]
+
+    @property
+    def times(self) -> NDArray[np.float64]:
+        """End times, s."""
+        return self.weights.times
 
     @cached_property
     def values(self) -> NDArray[np.float64]:
@@ -110,16 +119,50 @@ class FlownWinds:
         """Mean response in the vehicle's mean wind at the levels, (time, response)."""
         return self.weights.responses(random_wind(self.case, self.weights.levels).mean)
 
+    def covariance_between(self, first: int, second: int) -> NDArray[np.float64]:
+        """Return the covariance of two responses, by number, between all times, (time, time).
+
+        By the vehicle's random wind, straight between the levels.
+
+        Parameters
+        ----------
+        first, second : int
+
+        Returns
+        -------
+        (time, time) array
+        """
+        A, R = self.weights.weight, random_wind(self.case, self.weights.levels).covariance
+        return A[:, first] @ R @ A[:, second].T
+
     @cached_property
     def _covariance(self) -> NDArray[np.float64]:
-        """Of the responses between all times by the vehicle's random wind at the levels, (response, time, time)."""
-        A, R = self.weights.weight, random_wind(self.case, self.weights.levels).covariance
-        return np.einsum("mrk,nrk->rmn", A @ R, A, optimize=True)
+        """Of each response between all times, (response, time, time)."""
+        return np.array([self.covariance_between(r, r) for r in range(len(self.responses))])
 
     @property
     def predicted_std(self) -> NDArray[np.float64]:
         """By the vehicle's random wind, straight between the levels, (time, response)."""
         return np.sqrt(np.maximum(np.einsum("rmm->mr", self._covariance), 0.0))
+
+    @cached_property
+    def resultants(self) -> FlownResultants:
+        """The norms of responses of both planes, such as the resultant bending moment.
+
+        Raises
+        ------
+        PlanesError
+            The vehicle flies in one plane.
+        """
+        pairs = resultant_pairs(self.responses)
+        if not pairs:
+            raise PlanesError.of_one("a resultant", self.case.system.name)
+        numbers = {name: (self.responses.index(a), self.responses.index(b)) for name, (a, b) in pairs.items()}
+        units = tuple(self.unit(a) for a, _ in pairs.values())
+        return FlownResultants(
+            self.case, numbers, units, self.profiles, self.times, self.day, self.values, self.completed,
+            self.predicted_mean, self.covariance_between,
+        )  # fmt: skip
 
     @cached_property
     def missed_share(self) -> NDArray[np.float64]:
@@ -131,9 +174,7 @@ class FlownWinds:
     @cached_property
     def independent(self) -> NDArray[np.float64]:
         """Number of independent profiles behind each response at each time, (time, response)."""
-        n, m, r = self.values.shape
-        flat = self.values.reshape(n, m * r)
-        return np.array([independent_samples(flat[:, [j]], self.day) for j in range(m * r)]).reshape(m, r)
+        return independent_profiles(self.values, self.day)
 
     def percentiles(self, probabilities: Iterable[float] = PERCENTILES) -> xr.Dataset:
         """Return percentiles at each time, of the profiles and as predicted.
@@ -150,23 +191,14 @@ class FlownWinds:
             many independent profiles; ``predicted`` of a Gaussian wind of the vehicle's mean and filter.
         """
         p = np.array([float(x) for x in probabilities])
-        measured = np.quantile(self.completed, p, axis=0)
-        half = ndtri(0.5 + CONFIDENCE / 2) * np.sqrt(p * (1 - p))[:, None, None] / np.sqrt(self.independent)
-        ordered = np.sort(self.completed, axis=0)
-        n = len(ordered)
-        ends = []
-        for side in (-1, 1):
-            rank = np.clip((p[:, None, None] + side * half) * n - 0.5, 0, n - 1)
-            low = np.floor(rank).astype(int)
-            a, b = (np.take_along_axis(ordered, np.minimum(low + k, n - 1), axis=0) for k in (0, 1))
-            ends.append(a + (rank - low) * (b - a))
+        measured, interval = profile_percentiles(self.completed, self.independent, p)
         predicted = self.predicted_mean + ndtri(p)[:, None, None] * self.predicted_std
         dims = ("probability", "time", "response")
         return xr.Dataset(
             {
                 "measured": (dims, measured, {RULE: "response", "long_name": "percentile of the measured profiles"}),
                 "interval": (
-                    ("bound", *dims), np.array(ends), {RULE: "response", "long_name": "95 % interval of it"},
+                    ("bound", *dims), interval, {RULE: "response", "long_name": "95 % interval of it"},
                 ),
                 "predicted": (dims, predicted, {RULE: "response", "long_name": "percentile in a Gaussian wind"}),
             },
@@ -200,13 +232,8 @@ class FlownWinds:
         -------
         list of tuples
         """
-        r = self.responses.index(response)
-        size, found = np.abs(self.values[:, :, r]), []
-        for i in np.argsort(-size.max(axis=1))[:count]:
-            k, date = int(size[i].argmax()), self.profiles.time[i]
-            told = "" if np.isnat(date) else str(date)
-            found.append((self.profiles.names[i], told, float(self.values[i, k, r]), float(self.weights.times[k])))
-        return found
+        values = self.values[:, :, self.responses.index(response)]
+        return worst_profiles(values, self.profiles, self.weights.times, count)
 
     def normality(self, response: str) -> Normality | None:
         """Return how normal a response is at each time; None of fewer than 20 independent profiles, or all alike.
@@ -268,9 +295,17 @@ class FlownWinds:
             self.responses
         )
 
+    def unit(self, response: str) -> str:
+        """Return the unit of a response.
+
+        Parameters
+        ----------
+        response : str
+        """
+        return self.case.system.outputs[self.case.system.output_index(response)].unit
+
     def _coordinates(self) -> dict[str, object]:
-        outputs = self.case.system.outputs
-        units = [outputs[self.case.system.output_index(name)].unit for name in self.responses]
+        units = [self.unit(name) for name in self.responses]
         return {
             "time": ("time", self.weights.times, {"units": "s", "long_name": "flight time"}),
             "response": list(self.responses),
@@ -290,7 +325,7 @@ def fly(
     vehicle = case.vehicle_for("flying a measured wind")
     ends = case.checked_times(end_times(parse_times(vehicle.file.default_times) if times is None else times))
     names = case.checked_responses(responses)
-    soundings = soundings_of(profiles)
-    complete = complete_profiles(case, soundings, float(Climb.of(case).altitude(ends[-1])), component, sign)
+    met, soundings = met_winds(case, component, sign), soundings_of(profiles)
+    complete = complete_profiles(case, soundings, float(Climb.of(case).altitude(ends[-1])), met)
     weights = level_weights(case, ends, complete.levels, names)
     return FlownWinds(case, tuple(names), complete, weights, soundings.day)

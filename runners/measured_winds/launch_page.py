@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib import rc_context
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..present.style import COLORS, SHADES, STYLE, display, words, wrapped
@@ -30,7 +31,8 @@ def bracket(launch: DayOfLaunch) -> list[tuple[float, float]]:
         return []
     field = launch.flight.field
     return [
-        (p, launch.with_persistence(default_persistence(field, launch.component, p)).probability) for p in EXPONENTS
+        (p, launch.with_persistence(default_persistence(field, launch.met.components, p)).probability)
+        for p in EXPONENTS
     ]
 
 
@@ -81,7 +83,7 @@ def launch_page(launch: DayOfLaunch, title: str) -> str:
         f"- Of the season, nothing measured: {season.value:.2g}",
         *(f"- With growth of winds' change by lag to the power {q:.2g}: {chance:.2g}" for q, chance in bracket(launch)),
         *(f"- Measured: {name}" for name in launch.balloons.names),
-        f"- {launch.balloons.altitude.size} levels from {launch.balloons.altitude.min():.0f} to "
+        f"- {int((launch.balloons.component == 0).sum())} levels from {launch.balloons.altitude.min():.0f} to "
         f"{launch.balloons.altitude.max():.0f} m, error {launch.error:g} m/s",
         "",
         "## What drives it",
@@ -113,26 +115,18 @@ def launch_figure(launch: DayOfLaunch, title: str) -> Figure:
     """
     shown = launch.responses[:3]
     with rc_context(STYLE):
-        figure = Figure(figsize=(11.0, 2.6 + 2.4 * len(shown)), layout="constrained")
-        grid = figure.add_gridspec(len(shown), 2, width_ratios=(1.0, 1.6))
-        axes = figure.add_subplot(grid[:, 0])
-        found = launch.wind
-        h, mean, std = found["altitude"].values / 1000, found["mean"].values, found["std"].values
-        season, wide = found["climatology"].values, BAND * found["climatological_std"].values
-        axes.fill_betweenx(h, season - wide, season + wide, color="#bbbbbb", alpha=0.35, lw=0, label="season, 90 %")
-        axes.plot(season, h, color=COLORS["mean"], lw=1)
-        axes.fill_betweenx(h, mean - BAND * std, mean + BAND * std, color=COLORS["wind"], alpha=0.3, lw=0,
-                           label="at launch, 90 %")  # fmt: skip
-        axes.plot(mean, h, color=COLORS["wind"], lw=1.6)
-        for hours, color in zip(np.unique(launch.balloons.hours)[::-1], SHADES[1:], strict=False):
-            i = launch.balloons.hours == hours
-            axes.plot(launch.balloons.wind[i], launch.balloons.altitude[i] / 1000, ".", ms=3, color=color,
-                      label=f"measured {hours:g} h before")  # fmt: skip
-        axes.set(xlabel="wind along +Y (m/s)", ylabel="altitude (km)", ylim=(0, h[-1]))
-        axes.legend(fontsize=8)
+        figure = Figure(figsize=(11.0 if not launch.met.both else 14.0, 2.6 + 2.4 * len(shown)), layout="constrained")
+        columns = len(launch.met.components)
+        grid = figure.add_gridspec(len(shown), columns + 1, width_ratios=(*([1.0] * columns), 1.6))
+        for number, component in enumerate(launch.met.components):
+            axes = figure.add_subplot(grid[:, number])
+            draw_wind(axes, launch, number)
+            axes.set_xlabel(f"{component} wind (m/s)" if launch.met.both else "wind along +Y (m/s)")
+            if not number:
+                axes.legend(fontsize=8)
         limit = launch.limit()
         for k, name in enumerate(shown):
-            panel, r = figure.add_subplot(grid[k, 1]), launch.responses.index(name)
+            panel, r = figure.add_subplot(grid[k, -1]), launch.responses.index(name)
             unit = launch.flight.case.system.outputs[launch.flight.case.system.output_index(name)].unit
             factor, unit = display(unit, np.abs(launch.mean[:, r]) + launch.std[:, r])
             for m, s, color, strength, label in (
@@ -156,3 +150,29 @@ def launch_figure(launch: DayOfLaunch, title: str) -> Figure:
             told = f"\n{'GO' if launch.go else 'NO-GO'}: {launch.probability:.2g} of flights pass a limit"
         figure.suptitle(wrapped(f"{title}{told}"))
     return figure
+
+
+def draw_wind(axes: Axes, launch: DayOfLaunch, number: int) -> None:
+    """Draw one component of the wind at launch over altitude, with its bands, the season's and the balloons.
+
+    Parameters
+    ----------
+    axes : Axes
+    launch : DayOfLaunch
+    number : int
+        Of the component.
+    """
+    found = launch.wind.isel(component=number) if launch.met.both else launch.wind
+    h, mean, std = found["altitude"].values / 1000, found["mean"].values, found["std"].values
+    season, wide = found["climatology"].values, BAND * found["climatological_std"].values
+    axes.fill_betweenx(h, season - wide, season + wide, color="#bbbbbb", alpha=0.35, lw=0, label="season, 90 %")
+    axes.plot(season, h, color=COLORS["mean"], lw=1)
+    axes.fill_betweenx(h, mean - BAND * std, mean + BAND * std, color=COLORS["wind"], alpha=0.3, lw=0,
+                       label="at launch, 90 %")  # fmt: skip
+    axes.plot(mean, h, color=COLORS["wind"], lw=1.6)
+    balloons = launch.balloons
+    for hours, color in zip(np.unique(balloons.hours)[::-1], SHADES[1:], strict=False):
+        i = (balloons.hours == hours) & (balloons.component == number)
+        axes.plot(balloons.wind[i], balloons.altitude[i] / 1000, ".", ms=3, color=color,
+                  label=f"measured {hours:g} h before")  # fmt: skip
+    axes.set(ylabel="altitude (km)", ylim=(0, h[-1]))

@@ -22,11 +22,14 @@ from numpy.typing import NDArray
 
 from ...codegen.system.evaluation import MatrixEvaluator
 from ...codegen.system.functions import state_scales
+from ...model.system.names import WIND
 from ...model.wind.propagation import exponentials
+from ...model.wind.record import COMPONENTS
 from ..case.case import Case
 from ..case.climb import Climb
 from ..solvers.time_nodes import intervals, time_nodes
 
+WINDS = (WIND, *(f"{WIND}_{component}" for component in COMPONENTS))  # inputs, of one plane and of both
 STEP = 0.05  # s, at most
 TOGETHER = 400  # steps whose exponentials are computed at once
 GAUSS = 0.5 / np.sqrt(3.0)
@@ -43,8 +46,8 @@ class LevelWeights:
         End times, s.
     levels : (k,) array
         m; below the first and above the last the wind is held.
-    weight : (m, r, k) array
-        A, response by m/s.
+    weight : (m, r, c k) array
+        A, response by m/s: of the one wind that is met, or of both components one after the other.
     rest : (m, r) array
         What known inputs other than the wind do.
     altitude : (m,) array
@@ -58,7 +61,7 @@ class LevelWeights:
     altitude: NDArray[np.float64]
 
     def responses(self, wind: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the responses (..., m, r) to profiles (..., k) of the whole wind at the levels, m/s."""
+        """Return the responses (..., m, r) to profiles (..., c k) of the whole wind at the levels, m/s."""
         m, r, k = self.weight.shape
         return (wind @ self.weight.reshape(m * r, k).T).reshape(*wind.shape[:-1], m, r) + self.rest
 
@@ -91,16 +94,16 @@ def _level_weights(case: Case, times: Sequence[float], levels: NDArray[np.float6
     climb, executable = Climb.of(case), case.with_means
     system, n = executable.system, len(executable.system.states)
     nodes = time_nodes(executable, times)
-    wind = case.wind_input("a measured wind")
+    winds = [i for i, name in enumerate(system.input_names) if name in WINDS]
     scale = state_scales(system)
     begin, end, low, high = _steps(case, climb, nodes, levels)
     evaluate, outputs = (
         MatrixEvaluator(executable, ("A", "E", "inputs")),
         MatrixEvaluator(executable, ("C", "G", "inputs")),
     )
-    k, r = levels.size, len(rows)
-    X, rest = np.zeros((n, k)), np.zeros(n)
-    weight, of_rest = np.zeros((nodes.size, r, k)), np.zeros((nodes.size, r))
+    k, r, c = levels.size, len(rows), len(winds)
+    X, rest = np.zeros((c, n, k)), np.zeros(n)
+    weight, of_rest = np.zeros((nodes.size, r, c, k)), np.zeros((nodes.size, r))
     done = 0
 
     def read(node: float, low: float, high: float) -> None:
@@ -108,13 +111,13 @@ def _level_weights(case: Case, times: Sequence[float], levels: NDArray[np.float6
         C, G, inputs = outputs(node, low, high)
         C, G = C[rows] * scale, G[rows]
         others = inputs[:, 0].copy()
-        others[wind] = 0.0
+        others[winds] = 0.0
         phi = np.zeros(k)
         i, share, _ = _place(levels, float(climb.altitude(node)))
         phi[i] += 1 - share
         phi[min(i + 1, k - 1)] += share
         while done < nodes.size and nodes[done] <= node:
-            weight[done] = C @ X + np.outer(G[:, wind], phi)
+            weight[done] = (C @ X).swapaxes(0, 1) + G[:, winds, None] * phi
             of_rest[done] = C @ rest + G @ others
             done += 1
 
@@ -122,25 +125,27 @@ def _level_weights(case: Case, times: Sequence[float], levels: NDArray[np.float6
         read(system.start, low[0], high[0])
     for first in range(0, begin.size, TOGETHER):
         part = slice(first, first + TOGETHER)
-        Phi, of_powers, of_others = _exact(evaluate, scale, wind, begin[part], end[part], low[part], high[part])
+        Phi, of_powers, of_others = _exact(evaluate, scale, winds, begin[part], end[part], low[part], high[part])
         for j, at in enumerate(range(first, min(first + TOGETHER, begin.size))):
             a, b = float(begin[at]), float(end[at])
             h0, h1, h2 = climb.altitude([a, 0.5 * (a + b), b])
             rate, bend = (4 * h1 - 3 * h0 - h2) / (b - a), 4 * (h2 - 2 * h1 + h0) / (b - a) ** 2
             i, _, span = _place(levels, float(h1))
             last = min(i + 2, k)
-            X[:, :last] = Phi[j] @ X[:, :last]
+            X[..., :last] = Phi[j] @ X[..., :last]
             if span > 0:
-                by_altitude = (rate * of_powers[j, :, 1] + bend * of_powers[j, :, 2]) / span
+                by_altitude = (rate * of_powers[j, ..., 1] + bend * of_powers[j, ..., 2]) / span
                 share = (h0 - levels[i]) / span
-                X[:, i] += (1 - share) * of_powers[j, :, 0] - by_altitude
-                X[:, i + 1] += share * of_powers[j, :, 0] + by_altitude
+                X[..., i] += (1 - share) * of_powers[j, ..., 0] - by_altitude
+                X[..., i + 1] += share * of_powers[j, ..., 0] + by_altitude
             else:
-                X[:, i] += of_powers[j, :, 0]
+                X[..., i] += of_powers[j, ..., 0]
             rest = Phi[j] @ rest + of_others[j]
             if done < nodes.size and nodes[done] <= b:
                 read(b, low[at], high[at])
-    return LevelWeights(np.asarray(times, float), levels, weight, of_rest, climb.altitude(nodes))
+    return LevelWeights(
+        np.asarray(times, float), levels, weight.reshape(nodes.size, r, c * k), of_rest, climb.altitude(nodes)
+    )
 
 
 def _place(levels: NDArray[np.float64], h: float) -> tuple[int, float, float]:
@@ -177,24 +182,34 @@ def _steps(case: Case, climb: Climb, nodes: NDArray, levels: NDArray) -> tuple[N
 
 
 def _exact(
-    evaluate: MatrixEvaluator, scale: NDArray, wind: int, begin: NDArray, end: NDArray, low: NDArray, high: NDArray
+    evaluate: MatrixEvaluator,
+    scale: NDArray,
+    winds: list[int],
+    begin: NDArray,
+    end: NDArray,
+    low: NDArray,
+    high: NDArray,
 ) -> tuple[NDArray, NDArray, NDArray]:
-    """Return Phi (s, n, n), what wind of the powers 1, s, s^2 / 2 adds (s, n, 3), and other inputs (s, n), scaled."""
-    n, steps = scale.size, begin.size
+    """Return Phi (s, n, n), what winds of the powers 1, s, s^2 / 2 add (s, c, n, 3), other inputs (s, n), scaled."""
+    n, steps, c = scale.size, begin.size, len(winds)
+    size = n + POWERS * c + 1
+    first_power = n + POWERS * np.arange(c)
     sides = []
     for side in (-GAUSS, GAUSS):
-        M = np.zeros((steps, n + POWERS + 1, n + POWERS + 1))
+        M = np.zeros((steps, size, size))
         for j in range(steps):
             a, b = begin[j], end[j]
             A, E, inputs = evaluate(0.5 * (a + b) + side * (b - a), low[j], high[j])
             others = inputs[:, 0].copy()
-            others[wind] = 0.0
+            others[winds] = 0.0
             M[j, :n, :n] = A * scale / scale[:, None]
-            M[j, :n, n] = E[:, wind] / scale
-            M[j, :n, n + POWERS] = E @ others / scale
-        M[:, n, n + 1] = M[:, n + 1, n + 2] = 1.0
+            M[j, :n, first_power] = (E[:, winds] / scale[:, None]).T
+            M[j, :n, -1] = E @ others / scale
+        for power in range(POWERS - 1):
+            M[:, first_power + power, first_power + power + 1] = 1.0
         sides.append(M)
     step = (end - begin)[:, None, None]
     first, second = sides
     found = exponentials(0.5 * step * (first + second) + np.sqrt(3) / 12 * step**2 * (second @ first - first @ second))
-    return found[:, :n, :n], found[:, :n, n : n + POWERS], found[:, :n, n + POWERS]
+    of_powers = found[:, :n, n:-1].reshape(steps, n, c, POWERS).swapaxes(1, 2)
+    return found[:, :n, :n], of_powers, found[:, :n, -1]

@@ -67,6 +67,11 @@ class Persistence:
                     "scale_exponent are positive, exponent lies above 0 and up to 2"
                 )
 
+    @property
+    def parts(self) -> tuple[Persistence, ...]:
+        """Of each component of the wind that is met: itself."""
+        return (self,)
+
     def correlation(self, wavelength: ArrayLike, hours: float) -> NDArray[np.float64]:
         """Return the correlation of waves over a lag.
 
@@ -91,3 +96,43 @@ class Persistence:
             return np.ones(waves.shape)
         lives = self.hours * np.minimum(1.0, waves / self.wavelength) ** self.scale_exponent
         return np.exp(-((hours / lives) ** self.exponent))
+
+
+@dataclass(frozen=True)
+class ComponentPersistence:
+    """How long each component of the wind lasts, for vehicles that fly in both planes.
+
+    Parameters
+    ----------
+    zonal, meridional : Persistence
+    """
+
+    zonal: Persistence
+    meridional: Persistence
+
+    @property
+    def parts(self) -> tuple[Persistence, ...]:
+        """Of each component of the wind that is met."""
+        return self.zonal, self.meridional
+
+    @property
+    def source(self) -> str:
+        """Where the numbers are from."""
+        zonal, meridional = self.zonal.source, self.meridional.source
+        return zonal if zonal == meridional else f"zonal: {zonal}; meridional: {meridional}"
+
+    def correlation(self, wavelength: ArrayLike, hours: float) -> NDArray[np.float64]:
+        """Return the correlation of waves of both components over a lag.
+
+        Parameters
+        ----------
+        wavelength : (2, N) array_like
+            m, infinite allowed.
+        hours : float
+            The lag, h.
+
+        Returns
+        -------
+        (2, N) array
+        """
+        return np.array([p.correlation(w, hours) for p, w in zip(self.parts, np.asarray(wavelength), strict=True)])

@@ -1,8 +1,9 @@
 """The wind ahead of a vehicle from the wind below it (report 1.3): a Kalman filter over altitude.
 
-At each measured level the state of the vehicle's wind filter takes the gain k = P H / (H' P H + e^2) of what the wind
+At each measured level the state of the vehicle's wind filter takes the gain P H' (H P H' + e^2)^-1 of what the wind
 there is off its prediction; between levels it is carried by the filter's own transition. Ahead of the last measurement
-the prediction and its band follow. It is the conditional mean and variance of the Gaussian vector of all levels.
+the prediction and its band follow. Of both components each level gives two measurements. It is the conditional mean and
+variance of the Gaussian vector of all levels.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from ...model.errors import ParameterValueError
+from ...model.wind.record import COMPONENTS
 from ..case.case import Case
 from ..case.provenance import provenance
 from .random_wind import random_wind
@@ -21,11 +23,9 @@ BAND = 1.645  # holds 90 %
 
 def predict_wind(case: Case, altitude: ArrayLike, wind: ArrayLike, ahead: ArrayLike, error: float) -> xr.Dataset:
     """See :meth:`Study.predict_wind`."""
-    measured, values, wanted = (
-        _levels(name, x) for name, x in (("altitude", altitude), ("wind", wind), ("ahead", ahead))
-    )
-    if values.shape != measured.shape:
-        raise ParameterValueError(f"{values.size} winds at {measured.size} altitudes; give one each")
+    measured, wanted = _levels("altitude", altitude), _levels("ahead", ahead)
+    components = len(case.vehicle_for("the wind ahead").wind.means)
+    values = _winds(wind, measured.size, components)
     for name, levels in (("altitude", measured), ("ahead", wanted)):
         if not (np.diff(levels) > 0).all():
             raise ParameterValueError(f"{name} does not increase; sort the levels and keep each once")
@@ -36,33 +36,36 @@ def predict_wind(case: Case, altitude: ArrayLike, wind: ArrayLike, ahead: ArrayL
     if not 0 <= error < np.inf:
         raise ParameterValueError(f"an error of {error!r} m/s cannot be used; give 0 or more")
     field = random_wind(case, np.concatenate([measured, wanted]))
-    n, count = field.output.shape[1], measured.size
+    n, count, whole = field.output.shape[2], measured.size, field.levels.size
+    mean = field.mean.reshape(components, whole).T
     z, P = np.zeros(n), field.start
-    gains, predicted, std = np.zeros((count, n)), np.zeros(field.levels.size), np.zeros(field.levels.size)
-    for k in range(field.levels.size):
+    gains, predicted, std = (
+        np.zeros((count, components, n)),
+        np.zeros((whole, components)),
+        np.zeros((whole, components)),
+    )
+    for k in range(whole):
         if k:
             Phi = field.transition[k - 1]
             z, P = Phi @ z, Phi @ P @ Phi.T + field.added[k - 1]
         H = field.output[k]
-        predicted[k], std[k] = field.mean[k] + H @ z, np.sqrt(max(float(H @ P @ H), 0.0))
+        predicted[k], std[k] = mean[k] + H @ z, np.sqrt(np.maximum(np.einsum("ci,ij,cj->c", H, P, H), 0.0))
         if k < count:
-            size = float(H @ P @ H) + error**2
-            gains[k] = P @ H / size if size > 0 else 0.0
-            z = z + gains[k] * (values[k] - predicted[k])
-            keep = np.eye(n) - np.outer(gains[k], H)
-            P = keep @ P @ keep.T + error**2 * np.outer(gains[k], gains[k])
-    speed = {"units": "m/s"}
-    return xr.Dataset(
+            gain = P @ H.T @ np.linalg.pinv(H @ P @ H.T + error**2 * np.eye(components), hermitian=True)
+            z = z + gain @ (values[k] - predicted[k])
+            keep = np.eye(n) - gain @ H
+            P = keep @ P @ keep.T + error**2 * gain @ gain.T
+            gains[k] = gain.T
+    parts = {
+        "predicted": ("ahead", predicted[count:], "wind expected ahead"),
+        "std": ("ahead", std[count:], "its standard deviation"),
+        "one_step": ("altitude", predicted[:count], "wind expected from the levels below"),
+        "one_step_std": ("altitude", std[:count], "its standard deviation"),
+    }
+    found = xr.Dataset(
         {
-            "predicted": ("ahead", predicted[count:], speed | {"long_name": "wind expected ahead"}),
-            "std": ("ahead", std[count:], speed | {"long_name": "its standard deviation"}),
-            "band": (
-                ("bound", "ahead"), predicted[count:] + BAND * np.outer([-1, 1], std[count:]),
-                speed | {"long_name": "holds 90 %"},
-            ),
-            "one_step": ("altitude", predicted[:count], speed | {"long_name": "wind expected from the levels below"}),
-            "one_step_std": ("altitude", std[:count], speed | {"long_name": "its standard deviation"}),
-            "gain": (("altitude", "state"), gains, {"long_name": "Kalman gain, state of the wind filter by m/s"}),
+            name: ((level, "component"), array, {"units": "m/s", "long_name": text})
+            for name, (level, array, text) in parts.items()
         },
         {
             "altitude": ("altitude", measured, {"units": "m"}),
@@ -71,7 +74,30 @@ def predict_wind(case: Case, altitude: ArrayLike, wind: ArrayLike, ahead: ArrayL
             "state": [f"wind_{k + 1}" for k in range(n)],
         },
         provenance(case) | {"error_m_s": float(error)},
+    )
+    found["band"] = (
+        ("bound", "ahead", "component"), predicted[count:] + BAND * np.multiply.outer([-1, 1], std[count:]),
+        {"units": "m/s", "long_name": "holds 90 %"},
     )  # fmt: skip
+    found["gain"] = (
+        ("altitude", "component", "state"), gains, {"long_name": "Kalman gain, state of the wind filter by m/s"},
+    )  # fmt: skip
+    return found.squeeze("component") if components == 1 else found.assign_coords(component=list(COMPONENTS))
+
+
+def _winds(given: ArrayLike, levels: int, components: int) -> NDArray[np.float64]:
+    """Return measured winds as (levels, components)."""
+    wanted = (levels,) if components == 1 else (levels, components)
+    try:
+        found = np.asarray(given, float)
+    except (TypeError, ValueError):
+        raise ParameterValueError(f"wind = {given!r:.60} are no numbers") from None
+    if not np.isfinite(found).all():
+        raise ParameterValueError(f"wind is an array of finite numbers; {given!r:.60} is not")
+    if np.atleast_1d(found).shape != wanted:
+        each = "one each" if components == 1 else "one of each component: towards the east, towards the north"
+        raise ParameterValueError(f"{found.size} winds at {levels} altitudes; give {each}")
+    return found.reshape(levels, components)
 
 
 def _levels(name: str, given: ArrayLike) -> NDArray[np.float64]:

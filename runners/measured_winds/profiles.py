@@ -8,9 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ...model.errors import DataError, UnknownNameError
-from ...model.vehicle.planes import one_wind
-from ...model.wind.record import COMPONENTS
+from ...model.errors import DataError
 from ...model.wind.soundings.collection import Soundings
 from ...model.wind.soundings.quality import Quality
 from ...model.wind.soundings.read import LARGEST_GAP, at_levels, read_soundings
@@ -18,6 +16,7 @@ from ...model.wind.soundings.sounding import Sounding
 from ..case.case import Case
 from ..case.climb import Climb
 from .conditioning import Measured
+from .met_winds import MetWinds
 from .random_wind import random_wind
 
 FILL = 250.0  # m, between levels where nothing was measured
@@ -31,12 +30,13 @@ class CompleteProfiles:
     ----------
     levels : (k,) array
         m.
-    wind : (n, k) array
-        Along the vehicle's +Y, m/s: as measured, and elsewhere what the filter lets expect given that.
-    observed : (n, k) array of bool
+    wind : (n, c k) array
+        As the vehicle meets it, one component after the other, m/s: as measured, and elsewhere what the filter lets
+        expect given that.
+    observed : (n, c k) array of bool
     pattern : (n,) array of int
         Number of the profile's set of observed levels.
-    residual : tuple of (k, k) arrays
+    residual : tuple of (c k, c k) arrays
         Covariance of the wind given what was observed, by pattern; None where all levels were.
     names : tuple of str
     time : (n,) array of datetime64
@@ -51,29 +51,6 @@ class CompleteProfiles:
     names: tuple[str, ...]
     time: NDArray[np.datetime64]
     source: str
-
-
-def across(case: Case, component: str | None, sign: int) -> tuple[str, int]:
-    """Return which component of a wind blows across a vehicle's flight, and with which sign it is along +Y.
-
-    Raises
-    ------
-    DataError, UnknownNameError
-    """
-    vehicle = case.vehicle_for("a measured wind")
-    record = one_wind(vehicle, "a measured wind").record
-    if component is None:
-        if record is None:
-            raise DataError(
-                "does not say which component of the wind blows across the flight; add [wind.record], or give "
-                "component= ('zonal' or 'meridional')", file=vehicle.folder / "vehicle.toml", column="wind.record",
-            )  # fmt: skip
-        return record.origin.component, record.sign
-    if component not in COMPONENTS:
-        raise UnknownNameError("wind component", component, COMPONENTS)
-    if sign not in (1, -1):
-        raise DataError(f"the sign of a wind is {sign!r}; give 1 or -1")
-    return component, sign
 
 
 def soundings_of(profiles: str | Path | Soundings | Sounding) -> Soundings:
@@ -92,9 +69,7 @@ def soundings_of(profiles: str | Path | Soundings | Sounding) -> Soundings:
     raise DataError(f"{profiles!r:.60} are no soundings; give a file, or what read_soundings returns")
 
 
-def complete_profiles(
-    case: Case, soundings: Soundings, last: float, component: str | None = None, sign: int = 1
-) -> CompleteProfiles:
+def complete_profiles(case: Case, soundings: Soundings, last: float, met: MetWinds) -> CompleteProfiles:
     """Return profiles up to the altitude ``last`` (m) of the flight.
 
     Between levels the wind is straight. Where a profile holds nothing, below its first level, above its last one and in
@@ -103,19 +78,18 @@ def complete_profiles(
 
     Raises
     ------
-    NoVehicleError, DataError, UnknownNameError
+    NoVehicleError
     """
-    which, direction = across(case, component, sign)
-    measured = direction * soundings.component(which)
+    measured = met.of(soundings)
     first = float(Climb.of(case).altitudes[0])
     own = soundings.altitude
     below = np.arange(own[0] - FILL, first - FILL, -FILL)[::-1] if own[0] > first else np.zeros(0)
     above = np.arange(own[-1] + FILL, last + FILL, FILL) if own[-1] < last else np.zeros(0)
     levels = np.concatenate([np.maximum(below, min(first, own[0] - 1.0)), own, above])
     levels = np.unique(levels)
-    at = np.searchsorted(levels, own)
-    wind = np.full((len(measured), levels.size), np.nan)
-    wind[:, at] = measured
+    wind = np.full((len(measured[0]), len(measured), levels.size), np.nan)
+    wind[:, :, np.searchsorted(levels, own)] = np.stack(measured, axis=1)
+    wind = wind.reshape(len(wind), -1)
     observed = np.isfinite(wind)
     patterns, pattern = np.unique(observed, axis=0, return_inverse=True)
     random = random_wind(case, levels)

@@ -1,4 +1,7 @@
-"""The random wind at levels, as a vehicle's filter makes it: a Gaussian vector that is Markov over altitude."""
+"""The random wind at levels, as a vehicle's filter makes it: a Gaussian vector that is Markov over altitude.
+
+Of a vehicle that flies in both planes it is both components, towards the east and towards the north, of one filter.
+"""
 
 from __future__ import annotations
 
@@ -9,25 +12,27 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from ...model.vehicle.planes import one_wind
 from ...model.wind.propagation import SPACING, transitions
 from ...model.wind.shaping_filter import ShapingFilter
+from ...model.wind.statistics import WindModel
+from ...model.wind.two_components import TwoComponentWind
 from ..case.case import Case
-from ..design_wind.design_wind import mean_wind
 from ..solvers.discretisation import symmetric_root
 
 
 @dataclass(frozen=True, eq=False)
 class RandomWind:
-    """The wind at k levels: mean + H z, z_{j+1} = Phi_j z_j + e_j.
+    """c components of the wind at k levels: mean + H z, z_{j+1} = Phi_j z_j + e_j.
+
+    Vectors of the whole wind hold one component after the other, each over the levels.
 
     Attributes
     ----------
     levels : (k,) array
         m, increasing; below the filter's first altitude the wind is the one there.
-    mean : (k,) array
+    mean : (c k,) array
         m/s.
-    output : (k, n) array
+    output : (k, c, n) array
         H.
     transition, added : (k - 1, n, n) arrays
         Phi, and the covariance of e.
@@ -52,33 +57,33 @@ class RandomWind:
 
     @cached_property
     def covariance(self) -> NDArray[np.float64]:
-        """R between all levels, (k, k), m2/s2."""
-        k, n = self.output.shape
-        R = np.zeros((k, k))
-        carried = np.zeros((k, n))  # Phi(h_j, h_i) P_i H_i, of all i up to j
+        """R between all levels and components, (c k, c k), m2/s2."""
+        k, c, n = self.output.shape
+        R = np.zeros((c, k, c, k))
+        carried = np.zeros((k, c, n))  # H_i P_i Phi(h_j, h_i)', of all i up to j
         for j in range(k):
             if j:
                 carried[:j] = carried[:j] @ self.transition[j - 1].T
-            carried[j] = self.state_covariance[j] @ self.output[j]
-            R[j, : j + 1] = carried[: j + 1] @ self.output[j]
-            R[: j + 1, j] = R[j, : j + 1]
-        return R
+            carried[j] = self.output[j] @ self.state_covariance[j]
+            R[:, j, :, : j + 1] = np.einsum("cn,idn->cdi", self.output[j], carried[: j + 1])
+            R[:, : j + 1, :, j] = R[:, j, :, : j + 1].transpose(1, 2, 0)
+        return R.reshape(c * k, c * k)
 
     @cached_property
     def std(self) -> NDArray[np.float64]:
-        """Of the wind at each level, (k,), m/s."""
+        """Of the wind, (c k,), m/s."""
         return np.sqrt(np.maximum(np.diagonal(self.covariance), 0.0))
 
     def drawn(self, random: np.random.Generator, count: int) -> NDArray[np.float64]:
-        """Return random whole winds, (count, k), m/s."""
-        n = self.output.shape[1]
+        """Return random whole winds, (count, c k), m/s."""
+        n = self.output.shape[2]
         roots = symmetric_root(np.concatenate([self.start[None], self.added]))
         z = random.standard_normal((count, n)) @ roots[0].T
-        found = [z @ self.output[0]]
+        found = [z @ self.output[0].T]
         for Phi, root, H in zip(self.transition, roots[1:], self.output[1:], strict=True):
             z = z @ Phi.T + random.standard_normal((count, n)) @ root.T
-            found.append(z @ H)
-        return self.mean + np.array(found).T
+            found.append(z @ H.T)
+        return self.mean + np.array(found).transpose(1, 2, 0).reshape(count, -1)
 
 
 def random_wind(case: Case, levels: NDArray[np.float64]) -> RandomWind:
@@ -88,29 +93,43 @@ def random_wind(case: Case, levels: NDArray[np.float64]) -> RandomWind:
     ------
     NoVehicleError
     """
-    shaping_filter = one_wind(case.vehicle_for("a random wind"), "a random wind").shaping_filter
+    wind = case.vehicle_for("a random wind").wind
 
     def made() -> RandomWind:
         scale = case.parameters["wind.sigma_scale"].value
-        return filter_wind(shaping_filter, levels, mean_wind(case, levels), scale)
+        mean = case.parameters["wind.mean_scale"].value * np.concatenate([
+            table.polynomial(np.clip(levels, table.argument[0], table.argument[-1])) for table in wind.means
+        ])  # fmt: skip
+        return filter_wind(wind.shaping_filter, levels, mean, scale * component_rows(wind))
 
     return case.kept(("random wind", tuple(levels.tolist())), made)
 
 
+def component_rows(wind: WindModel | TwoComponentWind) -> NDArray[np.float64]:
+    """Return which of a filter's states make which of its winds, (c, n), ones and zeros."""
+    if isinstance(wind, WindModel):
+        return np.ones((1, wind.shaping_filter.order))
+    zonal = np.arange(wind.shaping_filter.order) < wind.zonal.shaping_filter.order
+    return np.array([zonal, ~zonal], float)
+
+
 def filter_wind(
-    shaping_filter: ShapingFilter, levels: NDArray[np.float64], mean: NDArray[np.float64], scale: float = 1.0
+    shaping_filter: ShapingFilter,
+    levels: NDArray[np.float64],
+    mean: NDArray[np.float64],
+    rows: NDArray[np.float64] | float = 1.0,
 ) -> RandomWind:
-    """Return the wind of a filter at levels.
+    """Return the wind of a filter at levels, or several winds that its states make.
 
     Parameters
     ----------
     shaping_filter : ShapingFilter
     levels : (k,) array
         m.
-    mean : (k,) array
+    mean : (c k,) array
         m/s.
-    scale : float
-        Factor on its standard deviation.
+    rows : (c, n) array or float
+        Factors on the filter's output by state, of each wind.
     """
     bottom, n = float(shaping_filter.altitude[0]), shaping_filter.order
     wanted = np.maximum(levels, bottom)
@@ -132,5 +151,5 @@ def filter_wind(
         transition.append(Phi)
         added.append(Q)
     shape = (wanted.size - 1, n, n)
-    H = scale * shaping_filter.at(wanted)[2]
+    H = shaping_filter.at(wanted)[2][:, None] * np.atleast_2d(rows)
     return RandomWind(levels, mean, H, np.reshape(transition, shape), np.reshape(added, shape), start)

@@ -3,11 +3,13 @@
 On an even grid of altitudes the vehicle's wind has the covariance R; with B its symmetric root and C the discrete
 cosine transform, w = mean + B C' x with x of independent standard values, x_k of the vertical wavelength 2 N dh / k.
 Winds of two times have cov = B C' diag(rho_k) C B, which goes with R for any |rho_k| <= 1; where the wind is even over
-altitude, x_k is its own wave of that length. One rho for all waves is the separable form rho R.
+altitude, x_k is its own wave of that length. One rho for all waves is the separable form rho R. Of both components w is
+one after the other and C transforms each: x are waves of either, which B joins.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -17,7 +19,6 @@ from scipy.fft import dct
 from scipy.optimize import least_squares, root_scalar
 
 from ...model.errors import ParameterValueError
-from ...model.vehicle.planes import one_wind
 from ...model.wind.soundings.collection import Soundings
 from ...model.wind.soundings.sounding import SoundingError
 from ..case.case import Case
@@ -30,6 +31,7 @@ from .persistence import (
     MEASURED,
     MEASURED_LEVELS,
     SCALE_EXPONENT,
+    ComponentPersistence,
     Persistence,
 )
 from .random_wind import RandomWind, random_wind
@@ -38,6 +40,10 @@ SPACING = 25.0  # m
 MOST = 1400  # levels
 LONGEST_HOURS = 1e5
 LEAST_PAIRS = 20
+ROUNDS, SETTLED = 20, 1e-8  # of fitting each component while the other is held
+
+Lasting = Persistence | ComponentPersistence
+Whole = Callable[[Persistence], Lasting]
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,34 +63,52 @@ class WindField:
         """Of the grid, (N,), m."""
         return self.wind.levels
 
+    @property
+    def components(self) -> int:
+        """How many components of the wind it holds."""
+        return self.wind.mean.size // self.levels.size
+
     @cached_property
     def wavelengths(self) -> NDArray[np.float64]:
-        """Of the waves, (N,), m; the first is infinite."""
+        """Of the waves, (c, N), m; the first is infinite."""
         h = self.levels
         with np.errstate(divide="ignore"):
-            return 2 * h.size * (h[1] - h[0]) / np.arange(h.size)
+            return np.tile(2 * h.size * (h[1] - h[0]) / np.arange(h.size), (self.components, 1))
 
     @cached_property
     def waves(self) -> NDArray[np.float64]:
-        """B C': the wind at each level by each wave, (N, N), m/s."""
+        """B C': the wind at each level by each wave, (c N, c N), m/s."""
         values, vectors = np.linalg.eigh(self.wind.covariance)
         root = (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
-        return np.asarray(dct(root, axis=1, norm="ortho"))
+        n = self.levels.size
+        return np.asarray(dct(root.reshape(len(root), -1, n), axis=2, norm="ortho")).reshape(root.shape)
 
-    def rows(self, altitudes: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the wind at altitudes within the grid by each wave, (k, N), straight between levels."""
+    def kept(self, persistence: Lasting, hours: float) -> NDArray[np.float64]:
+        """Return the correlation of each wave with itself some hours later, (c N,)."""
+        return persistence.correlation(self.wavelengths, hours).ravel()
+
+    def rows(self, altitudes: NDArray[np.float64], component: int = 0) -> NDArray[np.float64]:
+        """Return one component of the wind at altitudes within the grid by each wave, (k, c N), straight in between."""
         h = self.levels
         at = np.clip(np.searchsorted(h, altitudes, side="right") - 1, 0, h.size - 2)
         share = ((altitudes - h[at]) / (h[at + 1] - h[at]))[:, None]
+        at = at + component * h.size
         return (1 - share) * self.waves[at] + share * self.waves[at + 1]
 
+    def mean_at(self, altitudes: NDArray[np.float64], component: int = 0) -> NDArray[np.float64]:
+        """Return the mean of one component at altitudes (m) within the grid, (k,), m/s."""
+        return np.interp(altitudes, self.levels, self.wind.mean.reshape(self.components, -1)[component])
+
+    def std_at(self, altitudes: NDArray[np.float64], component: int = 0) -> NDArray[np.float64]:
+        """Return the standard deviation of one component at altitudes (m) within the grid, (k,), m/s."""
+        return np.interp(altitudes, self.levels, self.wind.std.reshape(self.components, -1)[component])
+
     def correlation_in_time(
-        self, persistence: Persistence, altitudes: NDArray[np.float64], hours: float
+        self, persistence: Lasting, altitudes: NDArray[np.float64], hours: float, component: int = 0
     ) -> NDArray[np.float64]:
-        """Return the correlation of the wind at altitudes (m) with itself some hours later, (k,)."""
-        rows = self.rows(altitudes)
-        rho = persistence.correlation(self.wavelengths, hours)
-        return (rows**2 @ rho) / (rows**2).sum(axis=1)
+        """Return the correlation of one component at altitudes (m) with itself some hours later, (k,)."""
+        rows = self.rows(altitudes, component)
+        return (rows**2 @ self.kept(persistence, hours)) / (rows**2).sum(axis=1)
 
 
 def wind_field(case: Case, last: float) -> WindField:
@@ -95,7 +119,7 @@ def wind_field(case: Case, last: float) -> WindField:
     NoVehicleError
     """
     first = float(Climb.of(case).altitudes[0])
-    shaping_filter = one_wind(case.vehicle_for("a random wind"), "a random wind").shaping_filter
+    shaping_filter = case.vehicle_for("a random wind").wind.shaping_filter
     bottom = max(first, float(shaping_filter.altitude[0]))
     top = min(max(last, bottom + 10 * SPACING), max(float(shaping_filter.altitude[-1]), bottom + 10 * SPACING))
     count = min(MOST, int(np.ceil((top - bottom) / SPACING)) + 1)
@@ -103,13 +127,14 @@ def wind_field(case: Case, last: float) -> WindField:
     return case.kept(("wind field", tuple(levels.tolist())), lambda: WindField(random_wind(case, levels)))
 
 
-def default_persistence(field: WindField, component: str, exponent: float = EXPONENTS[0]) -> Persistence:
+def default_persistence(field: WindField, components: Sequence[str], exponent: float = EXPONENTS[0]) -> Lasting:
     """Return the persistence whose correlation after 24 h is, in the mean over four levels, that measured at the Cape.
 
     Parameters
     ----------
     field : WindField
-    component : {'zonal', 'meridional'}
+    components : sequence of {'zonal', 'meridional'}
+        Of the field, in its order.
     exponent : float
         Of growth with lag.
 
@@ -122,49 +147,17 @@ def default_persistence(field: WindField, component: str, exponent: float = EXPO
         raise ParameterValueError(
             "the flight meets none of the levels at which persistence was measured (1.5 to 10.7 km); give persistence="
         )
-    levels = np.array(MEASURED_LEVELS)[inside]
-    return fitted_persistence(
-        field, levels, np.array(MEASURED[component])[inside], DAY, exponent,
-        ASSUMED.format(exponent=exponent, wavelength=LONG_WAVELENGTH),
-    )  # fmt: skip
+    levels, source = np.array(MEASURED_LEVELS)[inside], ASSUMED.format(exponent=exponent, wavelength=LONG_WAVELENGTH)
+
+    def fit(number: int, whole: Whole) -> Persistence:
+        wanted = float(np.array(MEASURED[components[number]])[inside].mean())
+        return _fitted(lambda p: float(field.correlation_in_time(whole(p), levels, DAY, number).mean()), wanted, DAY,
+                       exponent, source)  # fmt: skip
+
+    return _of_each(len(components), fit)
 
 
-def fitted_persistence(
-    field: WindField,
-    levels: NDArray[np.float64],
-    correlation: NDArray[np.float64],
-    hours: float,
-    exponent: float,
-    source: str,
-) -> Persistence:
-    """Return the persistence with a measured correlation of levels (m) after a lag (h), in the mean over the levels.
-
-    Raises
-    ------
-    ParameterValueError
-        A mean correlation that is not between 0 and 1.
-    """
-    wanted = float(np.mean(correlation))
-    if not 0 < wanted < 1:
-        raise ParameterValueError(
-            f"winds {hours:g} h apart have a correlation of {wanted:.3g}; persistence is fitted to one between 0 and 1"
-        )
-
-    def of(log_hours: float) -> Persistence:
-        return Persistence(float(np.exp(log_hours)), exponent, LONG_WAVELENGTH, SCALE_EXPONENT, source)
-
-    def off(log_hours: float) -> float:
-        return float(field.correlation_in_time(of(log_hours), levels, hours).mean()) - wanted
-
-    low, high = np.log(1e-3), np.log(LONGEST_HOURS)
-    if off(high) < 0:
-        raise ParameterValueError(
-            f"a correlation of {wanted:.6g} after {hours:g} h is more than any persistence has; give another"
-        )
-    return of(float(root_scalar(off, bracket=(low, high), method="brentq", xtol=1e-10).root))
-
-
-def measured_persistence(field: WindField, soundings: Soundings, component: str) -> Persistence:
+def measured_persistence(field: WindField, soundings: Soundings, components: Sequence[str]) -> Lasting:
     """Return the persistence of one's own soundings, from all pairs of one lag or of several.
 
     Parameters
@@ -172,11 +165,12 @@ def measured_persistence(field: WindField, soundings: Soundings, component: str)
     field : WindField
     soundings : Soundings
         With dates and hours.
-    component : {'zonal', 'meridional'}
+    components : sequence of {'zonal', 'meridional'}
+        Of the field, in its order.
 
     Returns
     -------
-    Persistence
+    Persistence or ComponentPersistence
         Of one lag with the exponent 2/3, which is assumed then; of two and more the exponent is fitted too.
 
     Raises
@@ -188,28 +182,82 @@ def measured_persistence(field: WindField, soundings: Soundings, component: str)
     """
     h = soundings.altitude
     inside = np.flatnonzero((h >= field.levels[0]) & (h <= field.levels[-1]))
-    values = soundings.component(component)[:, inside]
-    lags, found = _correlations(values - np.nanmean(values, axis=0), soundings.day) if inside.size else ([], [])
-    if not len(lags):
-        raise SoundingError(
-            f"{soundings.source}: no lag has {LEAST_PAIRS} pairs of soundings at levels of the flight; give more, with "
-            "hours in their dates"
+    levels = h[inside]
+
+    def fit(number: int, whole: Whole) -> Persistence:
+        values = soundings.component(components[number])[:, inside]
+        lags, found = _correlations(values - np.nanmean(values, axis=0), soundings.day) if inside.size else ([], [])
+        if not len(lags):
+            raise SoundingError(
+                f"{soundings.source}: no lag has {LEAST_PAIRS} pairs of soundings at levels of the flight; give more, "
+                "with hours in their dates"
+            )
+        pairs = ", ".join(f"{lag:g}" for lag in lags)
+        told = f"{soundings.source}, pairs {pairs} h apart; shorter lags and waves are assumed"
+
+        def correlation(tried: Persistence, lag: float) -> float:
+            return float(field.correlation_in_time(whole(tried), levels, lag, number).mean())
+
+        if len(lags) == 1:
+            wanted = float(found[0].mean())
+            return _fitted(lambda tried: correlation(tried, lags[0]), wanted, lags[0], EXPONENTS[0], told)
+
+        def off(x: NDArray[np.float64]) -> NDArray[np.float64]:
+            tried = Persistence(float(np.exp(x[0])), float(x[1]), source=told)
+            return np.array([correlation(tried, lag) - r.mean() for lag, r in zip(lags, found, strict=True)])
+
+        start, bounds = [np.log(2 * lags[-1]), EXPONENTS[0]], ([np.log(1e-3), 0.05], [np.log(1e5), 2.0])
+        best = least_squares(off, start, bounds=bounds)
+        return Persistence(float(np.exp(best.x[0])), float(best.x[1]), source=told)
+
+    return _of_each(len(components), fit)
+
+
+def _of_each(components: int, fit: Callable[[int, Whole], Persistence]) -> Lasting:
+    """Return the persistence of each component, fitted while the other's is held, in turns until both stay.
+
+    ``fit`` is given the number of a component and what makes the whole persistence of that component's.
+    """
+    if components == 1:
+        return fit(0, lambda tried: tried)
+    zonal, meridional = (fit(number, lambda tried: ComponentPersistence(tried, tried)) for number in range(2))
+    for _ in range(ROUNDS):
+        before = zonal, meridional
+        zonal = fit(0, lambda tried, other=meridional: ComponentPersistence(tried, other))
+        meridional = fit(1, lambda tried, other=zonal: ComponentPersistence(other, tried))
+        moved = (abs(now.hours / old.hours - 1) for now, old in zip((zonal, meridional), before, strict=True))
+        if max(moved) < SETTLED:
+            break
+    return ComponentPersistence(zonal, meridional)
+
+
+def _fitted(
+    correlation: Callable[[Persistence], float], wanted: float, hours: float, exponent: float, source: str
+) -> Persistence:
+    """Return the persistence with a wanted correlation after a lag (h).
+
+    Raises
+    ------
+    ParameterValueError
+        One that is not between 0 and 1.
+    """
+    if not 0 < wanted < 1:
+        raise ParameterValueError(
+            f"winds {hours:g} h apart have a correlation of {wanted:.3g}; persistence is fitted to one between 0 and 1"
         )
-    told = (
-        f"{soundings.source}, pairs {', '.join(f'{lag:g}' for lag in lags)} h apart; shorter lags and waves are assumed"
-    )
-    if len(lags) == 1:
-        return fitted_persistence(field, h[inside], found[0], lags[0], EXPONENTS[0], told)
 
-    def off(x: NDArray[np.float64]) -> NDArray[np.float64]:
-        tried = Persistence(float(np.exp(x[0])), float(x[1]), source=told)
-        return np.array([
-            field.correlation_in_time(tried, h[inside], lag).mean() - r.mean()
-            for lag, r in zip(lags, found, strict=True)
-        ])  # fmt: skip
+    def of(log_hours: float) -> Persistence:
+        return Persistence(float(np.exp(log_hours)), exponent, LONG_WAVELENGTH, SCALE_EXPONENT, source)
 
-    best = least_squares(off, [np.log(2 * lags[-1]), EXPONENTS[0]], bounds=([np.log(1e-3), 0.05], [np.log(1e5), 2.0]))
-    return Persistence(float(np.exp(best.x[0])), float(best.x[1]), source=told)
+    def off(log_hours: float) -> float:
+        return correlation(of(log_hours)) - wanted
+
+    low, high = np.log(1e-3), np.log(LONGEST_HOURS)
+    if off(high) < 0:
+        raise ParameterValueError(
+            f"a correlation of {wanted:.6g} after {hours:g} h is more than any persistence has; give another"
+        )
+    return of(float(root_scalar(off, bracket=(low, high), method="brentq", xtol=1e-10).root))
 
 
 def _correlations(values: NDArray, day: NDArray) -> tuple[list[float], list[NDArray[np.float64]]]:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from planes import in_both
 
 import ascentwind as aw
 from ascentwind.model.errors import DataError, ParameterValueError, UnknownNameError
@@ -11,7 +14,7 @@ from ascentwind.model.tables import Table
 from ascentwind.model.wind.month_winds import MONTHS, MonthWind, month_file, read_month, read_months
 from ascentwind.model.wind.range_reference import shipped_two_components
 from ascentwind.model.wind.statistics import WindModel
-from ascentwind.model.wind.two_components import plane_weights
+from ascentwind.model.wind.two_components import TwoComponentFilter, TwoComponentWind, plane_weights
 from ascentwind.runners.flight_load.limit_table import LimitError
 from ascentwind.runners.measured_winds.random_wind import filter_wind
 
@@ -64,6 +67,29 @@ def test_a_month_is_what_a_study_in_that_wind_says(as504):
     wanted = study.limit_passage(LIMITS, WINDOW, draws=4000).probability
     spread = np.hypot(wanted.standard_error, float(found["standard_error"][0, 0]))
     assert float(found["probability"][0, 0]) == pytest.approx(wanted.value, abs=4 * spread + 0.06 * wanted.value)
+
+
+@pytest.mark.slow
+def test_a_month_of_both_planes_is_what_a_study_in_that_wind_says(cache):
+    """February at 95 deg, 23 deg off the vehicle's own: both filters and their correlation put into the vehicle."""
+    moments = ["pitch_bending_moment", "yaw_bending_moment"]
+    limits = aw.Limits.over_time([0.0, 150.0], {n: [2e7, 2e7] for n in moments}, dict.fromkeys(moments, "N m"))
+    azimuth, vehicle = np.radians(95.0), in_both()
+    both = aw.Study.from_vehicle(vehicle)
+    found = both.availability(limits, months=["february"], azimuths=[azimuth], window=WINDOW, draws=4000)
+    (month,) = read_months(None, ["february"])
+    parts = [
+        WindModel(Table(old.name, "m/s", month.altitude, mean, "pchip"), part)
+        for old, mean, part in zip(vehicle.wind.means, month.mean, (month.zonal, month.meridional), strict=True)
+    ]
+    filters = TwoComponentFilter(month.zonal, month.meridional, month.noise_correlation, month.start_correlation)
+    study = aw.Study.from_vehicle(replace(vehicle, wind=TwoComponentWind(*parts, filters)))
+    study = study.with_parameters({"wind.azimuth": azimuth})
+    wanted = study.limit_passage(limits, WINDOW, draws=4000).probability
+    spread = np.hypot(wanted.standard_error, float(found["standard_error"][0, 0]))
+    assert float(found["probability"][0, 0]) == pytest.approx(wanted.value, abs=4 * spread + 0.06 * wanted.value)
+    level = study.response_statistics(np.arange(60.0, 90.1, 0.5)).resultants([0.00135]).peaks()[0].value
+    assert found["level"].sel(response="resultant_bending_moment").item() == pytest.approx(level, rel=5e-3)
 
 
 @pytest.fixture(scope="module")

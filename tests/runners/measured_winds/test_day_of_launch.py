@@ -123,7 +123,7 @@ def test_total_variance_over_simulated_soundings(as504):
     field, random = found.flight.field, np.random.default_rng(8)
     n = field.levels.size
     now, other = random.standard_normal((2, 1500, n))
-    rho = found.persistence.correlation(field.wavelengths, hours)
+    rho = field.kept(found.persistence, hours)
     before = rho * now + np.sqrt(1 - rho**2) * other
     z = before @ field.rows(sounding.altitude).T + error * random.standard_normal((1500, sounding.altitude.size))
     gain = found._gain
@@ -140,11 +140,11 @@ def test_total_variance_over_simulated_soundings(as504):
 def test_the_default_persistence_has_the_measured_correlation_after_a_day(as504):
     field = wind_field(as504, 30000.0)
     for component in ("zonal", "meridional"):
-        found = default_persistence(field, component)
+        found = default_persistence(field, [component])
         correlation = field.correlation_in_time(found, np.array(MEASURED_LEVELS), DAY)
         assert correlation.mean() == pytest.approx(np.mean(MEASURED[component]), abs=1e-8)
         assert "assumed" in found.source
-    slow, fast = default_persistence(field, "zonal", 1.0), default_persistence(field, "zonal")
+    slow, fast = default_persistence(field, ["zonal"], 1.0), default_persistence(field, ["zonal"])
     level = np.array([5830.0])
     assert field.correlation_in_time(slow, level, 3.0) > field.correlation_in_time(fast, level, 3.0)
 
@@ -153,7 +153,7 @@ def test_a_field_of_waves_has_the_winds_covariance_and_one_rho_is_separable(as50
     field = wind_field(as504, 12000.0)
     np.testing.assert_allclose(field.waves @ field.waves.T, field.wind.covariance, atol=1e-9)
     alike = Persistence(30.0, 1.0, 10_000.0, 0.0)
-    rho = alike.correlation(field.wavelengths, 6.0)
+    rho = field.kept(alike, 6.0)
     np.testing.assert_allclose((field.waves * rho) @ field.waves.T, np.exp(-0.2) * field.wind.covariance, rtol=1e-9)
 
 
@@ -161,7 +161,7 @@ def test_ones_own_pairs_give_the_persistence_back(as504):
     """Winds drawn every 6 h with a known persistence: hours and exponent within their sampling error."""
     field, true = wind_field(as504, 12000.0), Persistence(30.0, 1.0, source="true")
     random, count = np.random.default_rng(4), 3000
-    rho = true.correlation(field.wavelengths, 6.0)  # of p = 1, a first-order process
+    rho = field.kept(true, 6.0)  # of p = 1, a first-order process
     x = [random.standard_normal(field.levels.size)]
     for _ in range(count - 1):
         x.append(rho * x[-1] + np.sqrt(1 - rho**2) * random.standard_normal(rho.size))

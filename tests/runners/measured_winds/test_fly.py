@@ -10,14 +10,13 @@ import sounding_files as files
 from lag import lag
 from scipy import stats
 
-from ascentwind.model.errors import DataError, NoVehicleError, PlanesError, TimeRangeError, UnknownNameError
+from ascentwind.model.errors import DataError, NoVehicleError, TimeRangeError, UnknownNameError
 from ascentwind.model.tables import Table
 from ascentwind.model.wind.soundings.collection import Soundings
 from ascentwind.model.wind.soundings.sounding import Sounding, SoundingError
 from ascentwind.model.wind.statistics import WindModel
 from ascentwind.runners import Study
 from ascentwind.runners.case.climb import Climb
-from ascentwind.runners.flight_load.limit_table import Limits
 from ascentwind.runners.measured_winds.level_weights import level_weights
 from ascentwind.runners.measured_winds.random_wind import random_wind
 from ascentwind.runners.solvers.mean_response import mean_response
@@ -183,20 +182,6 @@ def test_what_cannot_be_flown_is_refused(as504, change, error, says):
     asked = {"profiles": soundings(levels, wind[None]), "times": TIMES} | change
     with pytest.raises(error, match=says):
         as504.fly(asked.pop("profiles"), asked.pop("times"), **asked)
-
-
-def test_both_planes_are_refused(cache):
-    study = Study.load("as504", compile=False, changes={"planes": "both"})
-    levels, wind = jagged()
-    limits = Limits.constant(1e7, "pitch_bending_moment", "N m")
-    for ask in (
-        lambda: study.fly(soundings(levels, wind[None]), TIMES),
-        lambda: study.day_of_launch(Sounding("one", "", None, levels, wind, 0 * wind), 3.0),
-        lambda: study.availability(limits),
-        lambda: study.predict_wind([300.0], [5.0], [900.0]),
-    ):
-        with pytest.raises(PlanesError, match="known for one plane alone, which is not how .as504. flies"):
-            ask()
 
 
 def test_a_system_of_ones_own_has_no_measured_wind():
