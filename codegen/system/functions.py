@@ -184,7 +184,8 @@ def _integrand(
     values = spline_lookup(groups, time)
     arguments = [time, values, p[INTERVAL : INTERVAL + parameters], x]
     integrand = p[1] * quadrature(*arguments) if quadrature else ca.MX(0, 1)
-    outputs = [sign * p[1] * core(*arguments), ca.MX(0, 1), integrand, ca.MX(0, 1)]
+    rate = ca.densify(sign * p[1] * core(*arguments))  # sparse where no state moves another
+    outputs = [rate, ca.MX(0, 1), integrand, ca.MX(0, 1)]
     return ca.Function(name, [s, x, z, p, u], outputs, list(INPUTS), list(OUTPUTS))
 
 

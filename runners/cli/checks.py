@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
@@ -12,6 +12,9 @@ from rich.table import Table
 from ..present.terminal import console, print_table
 from .job import Job, load_study, steps
 from .terminal import Changes, Turbulence, VehicleArgument, results_folder, whole
+
+if TYPE_CHECKING:
+    from ..statistics.resultant_agreement import ResultantAgreement
 
 WIDE = 150  # columns: tables that a narrow terminal wraps but a file keeps whole
 
@@ -43,6 +46,8 @@ def verify(
     with console.status("computing with every engine"):
         found = agreement(study, end_times, ensemble)
     _print_agreement(found)
+    if found.resultants is not None:
+        _print_resultants(found.resultants)
     if job:
         with console.status("drawing sample paths"):
             start, last = study.system.start, max(end_times)
@@ -82,6 +87,32 @@ def _print_agreement(found) -> None:
                     f"{std:.4g}", f"{low:.4g} to {high:.4g}", "yes" if found.inside[k, r, s] else "no",
                     end_section=s + 1 == reference["source"].size,
                 )  # fmt: skip
+    Console(file=console.file, width=max(console.width, WIDE), emoji=False, markup=False).print(table)
+
+
+def _print_resultants(found: ResultantAgreement) -> None:
+    from ..present.style import display, words
+    from ..statistics.agreement import REFERENCE
+    from ..statistics.engines import ENGINES
+
+    low, high = found.interval
+    title = f"Levels that resultants pass with {found.probability:g} at an instant, by independent engines"
+    table = Table("time", "resultant", title=title)
+    table.add_column(f"level, {ENGINES[REFERENCE].label}", justify="right")
+    for engine in found.differences:
+        table.add_column(f"{ENGINES[engine].label}, difference", justify="right")
+    table.add_column(f"of {found.flights} flights pass", justify="right")
+    table.add_column(f"{found.confidence:.0%} interval", justify="right")
+    table.add_column("inside")
+    for k, time in enumerate(found.times):
+        for r, resultant in enumerate(found.resultants):
+            factor, unit = display(found.units[r], found.level[:, r])
+            table.add_row(
+                f"{time:g} s", words(resultant), f"{factor * found.level[k, r]:.5g} {unit}",
+                *(f"{d[k, r]:.1e}" for d in found.differences.values()),
+                str(found.passed[k, r]), f"{low} to {high}", "yes" if found.inside[k, r] else "no",
+                end_section=r + 1 == len(found.resultants),
+            )  # fmt: skip
     Console(file=console.file, width=max(console.width, WIDE), emoji=False, markup=False).print(table)
 
 

@@ -12,7 +12,7 @@ from rich.table import Table
 from ...model.errors import AscentwindError, OutputFolderError, UnusedOptionError
 from ..present.terminal import console, errors, print_table
 from ..statistics.larger_side import LARGER_SIDE
-from .flight_load import print_levels
+from .flight_load import known_loads, print_levels
 from .job import SHOWN, Job, load_study, steps
 from .report import write_report
 from .system import run_system
@@ -21,6 +21,7 @@ from .terminal import Changes, OptionalVehicle, Turbulence, number, parse_change
 if TYPE_CHECKING:
     from ..flight_load.load import FlightLoad
     from ..statistics.peak_check import PeakCheck
+    from ..statistics.resultant_check import ResultantCheck
     from ..statistics.resultants import Resultants
     from ..statistics.results import ResponseStatistics
     from ..study import Study
@@ -64,7 +65,8 @@ def run(
 ) -> None:
     """Mean, variance and |mean| + 3 sigma of all responses over flight time: tables and figures.
 
-    Every peak is computed again by CVODES, one adjoint run back from it; exit code 1 when they disagree.
+    Every peak, of resultants too, is computed again by CVODES, one adjoint run back from it; exit code 1 when they
+    disagree.
     """
     if vehicle is None and system is None:
         raise typer.BadParameter("name a vehicle, or a system of one's own with --system FILE.toml")
@@ -85,6 +87,7 @@ def run(
     from ..statistics.peak_check import weighting_at, with_peak_check
     from ..statistics.percentiles import checked_probabilities
     from ..statistics.response_figures import weighting_figure
+    from ..statistics.resultant_check import with_resultant_check
     from ..statistics.resultants import has_resultants
     from ..views.along_vehicle_files import prepare_along_vehicle, write_along_vehicle
     from ..views.azimuth_sweep import check_turns, checked_azimuths
@@ -138,6 +141,13 @@ def run(
         statistics = with_peak_check(statistics, check, study)
         statistics.save(job.folder)
         families = sorted({*families, *(p.time for p in check.peaks[:1] if p.time > study.system.start)})
+    both_check = None
+    if both is not None:
+        with console.status("resultants again by another road"):
+            both_check = _check_resultants(study, both)
+        if both_check is not None:
+            statistics = with_resultant_check(statistics, both_check)
+            statistics.save(job.folder)
     loads = _flight_loads(study, end_times, (DESIGN, *chances))
     if loads:
         statistics = with_flight_levels(statistics, loads)
@@ -189,6 +199,8 @@ def run(
     if report:
         _compute_for_report(study, loads, job)
     agree = check is not None and check.agree
+    if both is not None:
+        agree = agree and both_check is not None and both_check.agree
     delays = _check_delays(study, check) if flown.zones is not None and check is not None else None
     if delays is not None:
         job.notes.append(delays[0])
@@ -196,6 +208,8 @@ def run(
     job.end()
     if check is not None:
         _print_verdict(check.verdict(), check.agree)
+    if both_check is not None:
+        _print_verdict(both_check.verdict(), both_check.agree)
     if delays is not None:
         _print_verdict(*delays)
     if report:
@@ -252,6 +266,18 @@ def _check_peaks(study: Study, statistics: ResponseStatistics) -> PeakCheck | No
         return None
 
 
+def _check_resultants(study: Study, both: Resultants) -> ResultantCheck | None:
+    """Hold the peaks of written resultants against CVODES; where it fails say so, so that nothing is lost."""
+    from ..statistics.resultant_check import check_resultants
+
+    try:
+        return check_resultants(study, both)
+    except AscentwindError as error:
+        text = f"The resultants could not be computed a second time, by CVODES, and stand unchecked: {error}"
+        errors.print(text, style="bold red", markup=False, highlight=False, soft_wrap=True)
+        return None
+
+
 def _flight_loads(study: Study, end_times: list[float], probabilities: tuple[float, ...]) -> list[FlightLoad]:
     """Return the flight's load of every response between the first and the last end time; where it fails say so."""
     from ..flight_load.request import NoVarianceError
@@ -259,15 +285,16 @@ def _flight_loads(study: Study, end_times: list[float], probabilities: tuple[flo
     loads: list[FlightLoad] = []
     if end_times[-1] <= end_times[0]:
         return loads
-    with steps("loads of the flight", len(study.system.outputs)) as bar:
-        for output in study.system.outputs:
+    names = known_loads(study)
+    with steps("loads of the flight", len(names)) as bar:
+        for name in names:
             try:
-                loads.append(study.flight_load(output.name, (end_times[0], end_times[-1]), probabilities))
+                loads.append(study.flight_load(name, (end_times[0], end_times[-1]), probabilities))
                 _ = loads[-1].levels
             except NoVarianceError:
                 pass
             except AscentwindError as error:
-                text = f"The flight's level of {output.name} could not be computed, all else stands: {error}"
+                text = f"The flight's level of {name} could not be computed, all else stands: {error}"
                 errors.print(text, style="bold red", markup=False, highlight=False, soft_wrap=True)
             bar.done()
     return loads

@@ -76,7 +76,7 @@ def with_flight_levels(statistics: ResponseStatistics, loads: Sequence[FlightLoa
     ResponseStatistics
         Over (response) besides: ``flight_level``, ``flight_level_lower`` and ``flight_level_upper``, the ends of the
         95 % interval of the sampling, NaN for a response without a load; ``flight_level_upper_share``, the share of the
-        flights that pass it on the upper side.
+        flights that pass it on the upper side. Over (resultant) the first three with ``resultant_`` in front.
     """
     found = {
         load.response: (float(load.level[0]), *load.levels[0].interval, float(load.side_shares.sel(side="upper")[0]))
@@ -92,6 +92,12 @@ def with_flight_levels(statistics: ResponseStatistics, loads: Sequence[FlightLoa
     }
     share = {"units": "1", "long_name": "share of the flights that pass the level which do so on the upper side"}
     variables["flight_level_upper_share"] = ("response", values[:, 3], share)
+    if "resultant" in statistics.dataset.dims:
+        values = np.array([found.get(str(name), (np.nan,) * 4) for name in statistics.dataset["resultant"].values])
+        variables |= {
+            f"resultant_{name}": ("resultant", values[:, k], {RULE: "resultant", "long_name": label})
+            for k, (name, label) in enumerate(labels.items())
+        }
     window = list(loads[0].window)
     return ResponseStatistics(statistics.dataset.assign(variables).assign_attrs(flight_level_window_s=window))
 

@@ -156,6 +156,52 @@ class AdjointSolver:
         mean = quadratures[:, s] * output_scale + direct
         return AdjointRun(time, variance, mean, adjoint, counters.totals)
 
+    def pair_moments(
+        self, time: float, pairs: Sequence[tuple[int, ...]]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return means and covariances of pairs of responses, by the variances of both and of their sum.
+
+        Parameters
+        ----------
+        time : float
+            t2, s.
+        pairs : sequence of (int, int)
+            Rows of responses.
+
+        Returns
+        -------
+        mean : (pairs, 2) array
+        covariance : (pairs, sources, 2, 2) array
+
+        Raises
+        ------
+        IntegrationError, StepBudgetError
+        """
+        system = self._executable.system
+        node = float(time_nodes(self._executable, [time])[0])
+        sizes = typical_sizes(self._executable, node)
+        output_scale = self._output_scales(sizes)
+        scaled, G, inputs = self._terminal(node, output_scale)
+        first, second = np.array(pairs).T
+        columns = np.concatenate([scaled[:, first], scaled[:, second], scaled[:, first] + scaled[:, second]], axis=1)
+        variance, integral, width = np.empty((0, len(system.sources))), np.empty(0), len(system.outputs)
+        for begin in range(0, columns.shape[1], width):
+            part = np.arange(begin, min(begin + width, columns.shape[1]))
+            again = np.resize(part, width)  # a run has as many columns as there are responses
+            back, quadratures, _ = self._backward(columns[:, again], node, system.start, growing=sizes is None)
+            adjoint = back / self._state_scale[:, None]
+            added = [np.einsum("ir,ij,jr->r", adjoint, P, adjoint) for P in self._start_covariance]
+            found = quadratures[:, : len(system.sources)] + np.array(added).T
+            variance = np.concatenate([variance, found[: part.size]])
+            integral = np.concatenate([integral, quadratures[: part.size, len(system.sources)]])
+        own, other, together = np.split(variance, 3)
+        scale = output_scale[np.array(pairs)]
+        mean = np.stack(np.split(integral, 3)[:2], axis=1) * scale + (G @ inputs)[np.array(pairs)]
+        covariance = np.empty((*own.shape, 2, 2))
+        covariance[..., 0, 0], covariance[..., 1, 1] = own, other
+        covariance[..., 0, 1] = covariance[..., 1, 0] = 0.5 * (together - own - other)
+        return mean, covariance * (scale[:, :, None] * scale[:, None, :])[:, None]
+
     def steps(self, adjoint: NDArray[np.float64], time: float, earliest: float) -> int:
         """Return the number of steps from ``time`` to ``earliest`` (s), with adjoints (responses, n) at ``time``."""
         scaled = (adjoint * self._state_scale).T / np.array([o.scale for o in self._executable.system.outputs])

@@ -13,6 +13,7 @@ from .cvodes import Cvodes
 from .engine import Progress, relative_difference
 from .engines import ENGINES, response_statistics
 from .ensemble import Ensemble
+from .resultant_agreement import ResultantAgreement, resultant_agreement
 from .results import ResponseStatistics
 
 if TYPE_CHECKING:
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 REFERENCE = Cvodes.name
 LIMIT = 1e-6  # relative, between engines that only discretise
 SUBSTEP_ERROR = 5e-5  # relative, of an ensemble of infinitely many runs (tests/runners/solvers/test_ensemble.py)
+NOTHING = 1e-14  # of the combined deviation: what a solver's rounding makes of a source that does not reach a response
 FALSE_ALARM = 1e-3  # chance that a right ensemble is called wrong, all entries together
 
 
@@ -40,6 +42,8 @@ class Agreement:
     mean_inside : (times, responses, sources) array of bool
     impossible : (times, responses, sources) array of bool
         Entries outside an interval so wide that a right result would leave it once in a thousand ensembles.
+    resultants : ResultantAgreement or None
+        Of a system in both planes.
     """
 
     statistics: dict[str, ResponseStatistics]
@@ -48,6 +52,7 @@ class Agreement:
     inside: NDArray[np.bool_]
     mean_inside: NDArray[np.bool_]
     impossible: NDArray[np.bool_]
+    resultants: ResultantAgreement | None = None
 
     @property
     def agree(self) -> bool:
@@ -70,6 +75,26 @@ class Agreement:
                 f"{int(self.impossible.sum())} of {self.impossible.size} entries lie outside the ensemble by more than "
                 f"chance allows, the first in {self._entry(worst)}"
             )
+        return found + self._complaints_of_resultants()
+
+    def _complaints_of_resultants(self) -> list[str]:
+        of, found = self.resultants, []
+        if of is None:
+            return found
+        for engine, values in of.differences.items():
+            k, r = np.unravel_index(np.nanargmax(np.where(np.isnan(values), np.inf, values)), values.shape)
+            if not values[k, r] <= LIMIT:
+                found.append(
+                    f"mean, covariance or level of {of.resultants[r]} by {ENGINES[engine].label} differs by "
+                    f"{values[k, r]:.1e} at {of.times[k]:g} s; {LIMIT:g} is allowed"
+                )
+        impossible = of.impossible(FALSE_ALARM)
+        if impossible.any():
+            k, r = (int(i[0]) for i in np.nonzero(impossible))
+            found.append(
+                f"{of.passed[k, r]} of {of.flights} simulated flights pass the level of {of.resultants[r]} at "
+                f"{of.times[k]:g} s, which {of.probability:g} should, by more than chance allows"
+            )
         return found
 
     def verdict(self) -> str:
@@ -80,10 +105,17 @@ class Agreement:
         worst = max((float(d.max()) for d in self.differences.values()), default=0.0)
         names = ", ".join(ENGINES[e].label for e in (REFERENCE, *self.differences))
         ensemble = self.statistics["ensemble"].attrs
+        both = ""
+        if self.resultants is not None:
+            apart = max((float(d.max()) for d in self.resultants.differences.values()), default=0.0)
+            both = (
+                f" Resultants agree within {apart:.1e}; of {self.resultants.inside.size} levels "
+                f"{self.resultants.inside.sum()} are passed by as many flights as expected."
+            )
         return (
             f"The engines agree: standard deviations by {names} within {worst:.1e}; {self.inside.sum()} of "
             f"{self.inside.size} lie in the {ensemble['confidence']:.0%} interval of {ensemble['runs']} simulated "
-            f"flights (about {ensemble['confidence'] * self.inside.size:.0f} expected), none beyond chance."
+            f"flights (about {ensemble['confidence'] * self.inside.size:.0f} expected), none beyond chance.{both}"
         )
 
     def _entry(self, index: tuple) -> str:
@@ -115,28 +147,31 @@ def agreement(case: Case, times: list[float], ensemble: Ensemble, progress: Prog
         statistics[name] = response_statistics(case, times, engine=engine.tight() or ensemble, progress=progress)
     reference = statistics[REFERENCE]
     std, mean = reference.std.values, reference.mean.values
+    nothing = NOTHING * std[..., -1:]
     differences, mean_differences = {}, {}
     for name, found in statistics.items():
         if name == REFERENCE or ENGINES[name].tight() is None:
             continue
-        differences[name] = relative_difference(found.std.values, std)
+        apart = np.abs(found.std.values - std)
+        differences[name] = np.where(apart <= nothing, 0.0, relative_difference(found.std.values, std))
         size = np.maximum(np.maximum(np.abs(mean), std), np.finfo(float).tiny)
         mean_differences[name] = np.abs(found.mean.values - mean) / size
     sampled = statistics["ensemble"]
     wide = 1 - FALSE_ALARM / (2 * std.size)  # Bonferroni: the chances of all entries, means and deviations, add up
-    in_std = _inside(std, std_interval(sampled.std.values, ensemble.runs, wide))
+    in_std = _inside(std, std_interval(sampled.std.values, ensemble.runs, wide), nothing)
     in_mean = _inside(mean, mean_interval(sampled.mean.values, sampled.std.values, ensemble.runs, wide))
     return Agreement(
         statistics,
         differences,
         mean_differences,
-        _inside(std, (sampled["std_low"].values, sampled["std_high"].values)),
+        _inside(std, (sampled["std_low"].values, sampled["std_high"].values), nothing),
         _inside(mean, (sampled["mean_low"].values, sampled["mean_high"].values)),
         ~(in_std & in_mean),
+        resultant_agreement(case, times, statistics, ensemble),
     )
 
 
-def _inside(value: NDArray, interval: tuple[NDArray, NDArray]) -> NDArray[np.bool_]:
+def _inside(value: NDArray, interval: tuple[NDArray, NDArray], nothing: NDArray | float = 0.0) -> NDArray[np.bool_]:
     low, high = interval
-    slack = SUBSTEP_ERROR * np.abs(value)  # where nothing is random the interval is a point
+    slack = SUBSTEP_ERROR * np.abs(value) + nothing  # where nothing is random the interval is a point
     return (low - slack <= value) & (value <= high + slack)

@@ -32,6 +32,8 @@ def by_response(statistics: xr.Dataset) -> xr.Dataset:
     found = whole(statistics)
     units = [str(unit) for unit in found["unit"].values]
     dims = {"response": units} | ({"other_response": units} if "other_response" in found.dims else {})
+    if "resultant" in found.dims:
+        dims["resultant"] = [str(unit) for unit in found["resultant_unit"].values]
     return with_conventions(one_unit_a_variable(found, dims))
 
 
@@ -68,6 +70,9 @@ def read_statistics(path: Path) -> xr.Dataset:
     units = [stored[v].attrs for v in stored.data_vars if stored[v].attrs.get("quantity") == "std"]
     by_name = {attributes["response"]: attributes["response_unit"] for attributes in units}
     found.attrs = {k: v for k, v in found.attrs.items() if k not in ("Conventions", "history")}
+    if "resultant" in found.dims:
+        of = {a["resultant"]: a["resultant_unit"] for a in (v.attrs for v in stored.values()) if "resultant" in a}
+        found = found.assign_coords(resultant_unit=("resultant", [of[str(r)] for r in found["resultant"].values]))
     return found.assign_coords(unit=("response", [by_name[str(r)] for r in found["response"].values]))
 
 
