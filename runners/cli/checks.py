@@ -14,7 +14,7 @@ from .job import Job, load_study, steps
 from .terminal import Changes, Turbulence, VehicleArgument, results_folder, whole
 
 if TYPE_CHECKING:
-    from ..statistics.resultant_agreement import ResultantAgreement
+    from ..statistics.agreement_of_resultants import ResultantAgreement
 
 WIDE = 150  # columns: tables that a narrow terminal wraps but a file keeps whole
 

@@ -21,7 +21,7 @@ from .terminal import Changes, OptionalVehicle, Turbulence, number, parse_change
 if TYPE_CHECKING:
     from ..flight_load.load import FlightLoad
     from ..statistics.peak_check import PeakCheck
-    from ..statistics.resultant_check import ResultantCheck
+    from ..statistics.peaks_of_resultants import ResultantCheck
     from ..statistics.resultants import Resultants
     from ..statistics.results import ResponseStatistics
     from ..study import Study
@@ -85,9 +85,9 @@ def run(
     from ..statistics.larger_side import LABEL
     from ..statistics.norm import LIKE_3_SIGMA
     from ..statistics.peak_check import weighting_at, with_peak_check
+    from ..statistics.peaks_of_resultants import with_resultant_check
     from ..statistics.percentiles import checked_probabilities
     from ..statistics.response_figures import weighting_figure
-    from ..statistics.resultant_check import with_resultant_check
     from ..statistics.resultants import has_resultants
     from ..views.along_vehicle_files import prepare_along_vehicle, write_along_vehicle
     from ..views.azimuth_sweep import check_turns, checked_azimuths
@@ -268,7 +268,7 @@ def _check_peaks(study: Study, statistics: ResponseStatistics) -> PeakCheck | No
 
 def _check_resultants(study: Study, both: Resultants) -> ResultantCheck | None:
     """Hold the peaks of written resultants against CVODES; where it fails say so, so that nothing is lost."""
-    from ..statistics.resultant_check import check_resultants
+    from ..statistics.peaks_of_resultants import check_resultants
 
     try:
         return check_resultants(study, both)

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..solvers.ensemble import mean_interval, std_interval
+from .agreement_of_resultants import ResultantAgreement, resultant_agreement
 from .cvodes import Cvodes
 from .engine import Progress, relative_difference
 from .engines import ENGINES, response_statistics
 from .ensemble import Ensemble
-from .resultant_agreement import ResultantAgreement, resultant_agreement
 from .results import ResponseStatistics
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from ascentwind.model import define_system
 from ascentwind.runners.flight_load.files import with_flight_levels
 from ascentwind.runners.solvers.adjoint import AdjointSolver
 from ascentwind.runners.statistics.cvodes import Cvodes
-from ascentwind.runners.statistics.resultant_check import check_resultants, with_resultant_check
+from ascentwind.runners.statistics.peaks_of_resultants import check_resultants, with_resultant_check
 from ascentwind.runners.statistics.resultants import Resultants
 
 END, COMMON = 3.0, 0.6

@@ -15,7 +15,7 @@ from ..solvers.ensemble import run_ensemble
 from .cvodes import Cvodes
 from .ensemble import Ensemble
 from .norm import NormOfNormal
-from .resultant_check import law_difference, laws_by_adjoint
+from .peaks_of_resultants import law_difference, laws_by_adjoint
 from .resultants import resultant_pairs
 from .results import ResponseStatistics
 

@@ -11,7 +11,7 @@ from planes import in_both
 
 import ascentwind as aw
 from ascentwind.runners.statistics.agreement import FALSE_ALARM, Agreement
-from ascentwind.runners.statistics.resultant_agreement import ResultantAgreement, resultant_agreement
+from ascentwind.runners.statistics.agreement_of_resultants import ResultantAgreement, resultant_agreement
 
 FLIGHTS = aw.Ensemble(runs=20_000, seed=504, confidence=0.99)
 TIMES = [60.0, 75.0]
