@@ -201,6 +201,8 @@ def run(
     agree = check is not None and check.agree
     if both is not None:
         agree = agree and both_check is not None and both_check.agree
+    if both_check is not None:
+        job.notes.append(both_check.verdict())
     delays = _check_delays(study, check) if flown.zones is not None and check is not None else None
     if delays is not None:
         job.notes.append(delays[0])
