@@ -25,12 +25,20 @@ class ControlLaw:
     engine_angle: ca.SX
 
 
-def control_law(numbers: Numbers, motion: Motion, solved: Accelerations) -> ControlLaw:
-    """Close the loop: T1 and T2 of what is measured (4-5, 4-6), load relief, and the actuator T3 (4-7)."""
+def control_law(
+    numbers: Numbers, motion: Motion, solved: Accelerations, programme: tuple[ca.SX, ca.SX] | None = None
+) -> ControlLaw:
+    """Close the loop: T1 and T2 of what is measured (4-5, 4-6), load relief, and the actuator T3 (4-7).
+
+    ``programme`` is attitude and attitude rate that are told beside those of the flight (rad, rad/s).
+    """
     tables, networks = numbers.tables, numbers.networks
     slopes = mode_column(tables, numbers.modes, "slope_at_sensor")
-    T1 = transfer_function("T1", *networks["T1"], motion.attitude + slopes.T @ motion.eta)
-    T2 = transfer_function("T2", *networks["T2"], motion.attitude_rate + slopes.T @ motion.eta_rate)
+    attitude, rate = motion.attitude + slopes.T @ motion.eta, motion.attitude_rate + slopes.T @ motion.eta_rate
+    if programme is not None:
+        attitude, rate = attitude - programme[0], rate - programme[1]
+    T1 = transfer_function("T1", *networks["T1"], attitude)
+    T2 = transfer_function("T2", *networks["T2"], rate)
     relief = load_relief.feedbacks(tables, numbers.sensors, motion, solved)
     attitude_factor, rate_factor = tables["control.attitude_factor"], tables["control.rate_factor"]
     command = attitude_factor * T1.output + rate_factor * T2.output

@@ -11,6 +11,7 @@ from ..system.labels import Output
 from ..vehicle.biases import WIND_BIAS
 from ..vehicle.columns import OWN_ANGLE
 from ..vehicle.loads import AXIAL_FORCE, load_name
+from ..vehicle.mean_wind import GROUND_VELOCITY, PROGRAMME
 from ..vehicle.planes import Plane
 from . import rigid_body
 from .block import Block
@@ -76,12 +77,13 @@ def plane_equations(plane: Plane, numbers: Numbers, turbulence: ca.SX, winds: Wi
     vehicle = plane.vehicle
     motion, handles = Motion.of(numbers.modes, numbers.tanks, numbers.zones), Handles.new()
     solved = solved_motion(vehicle, numbers, motion, handles)
-    control = control_law(numbers, motion, solved)
+    control = control_law(numbers, motion, solved, _programme(plane, numbers))
     met = [random + mean for random, mean in zip(winds.random, winds.mean, strict=True)]
     if WIND_BIAS in numbers.biases:
         deviation = numbers.biases[WIND_BIAS].deviation
         met = [wind + deviation * expected for wind, expected in zip(met, winds.expected, strict=True)]
-    zones = penetration(in_plane(plane, numbers, met) + turbulence, numbers.zones, numbers.tables)
+    across = in_plane(plane, numbers, met) + _of_turned_path(plane, numbers, winds.mean)
+    zones = penetration(across + turbulence, numbers.zones, numbers.tables)
     own = _own_angle(plane, numbers)
     alpha = rigid_body.angle_of_attack(numbers.tables, motion.attitude, motion.lateral_velocity, zones.reference) + own
     blocks = [
@@ -125,6 +127,26 @@ def in_plane(plane: Plane, numbers: Numbers, winds: Sequence[ca.SX]) -> ca.SX:
     if plane.name == "yaw" or plane.vehicle.file.wind.pitch_wind == "horizontal":
         return wind
     return numbers.tables["altitude_rate"] / numbers.tables["relative_velocity"] * wind
+
+
+def _of_turned_path(plane: Plane, numbers: Numbers, mean: Sequence[ca.SX]) -> ca.SX:
+    """Return what the mean wind across the path in pitch is more than its deviations' share, m/s.
+
+    The path through the mean wind is turned against that over the ground: a deviation is met by hdot / V_air of it, and
+    the mean itself, by the law of sines, by hdot / V_ground. One speed makes both the same.
+    """
+    tables = numbers.tables
+    if GROUND_VELOCITY not in tables or plane.name == "yaw" or plane.vehicle.file.wind.pitch_wind == "horizontal":
+        return ca.SX(0)
+    return (tables["relative_velocity"] / tables[GROUND_VELOCITY] - 1) * in_plane(plane, numbers, mean)
+
+
+def _programme(plane: Plane, numbers: Numbers) -> tuple[ca.SX, ca.SX] | None:
+    """Return attitude and rate of the wind-biased programme, where the vehicle flies it."""
+    if plane.name == "yaw" or PROGRAMME not in numbers.tables:
+        return None
+    attitude, rate = numbers.tables[PROGRAMME], numbers.tables[f"{PROGRAMME}_rate"]
+    return attitude * numbers.undisturbed, rate * numbers.undisturbed
 
 
 def _own_angle(plane: Plane, numbers: Numbers) -> ca.SX:

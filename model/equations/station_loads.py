@@ -24,6 +24,7 @@ from ..vehicle.columns import (
     whole_shear_columns,
 )
 from ..vehicle.loads import AXIAL_FORCE, BENDING_MOMENT, SHEAR_FORCE, load_name
+from ..vehicle.mean_wind import in_air
 from ..vehicle.noise_loads import needed_columns
 from ..vehicle.vehicle import Vehicle
 from ..vehicle.vehicle_file import TableEntry
@@ -131,7 +132,8 @@ def load_station_loads(vehicle: Vehicle, load: str = BENDING_MOMENT) -> StationL
 
     def tables(column: Column) -> tuple[Table, ...]:
         values = csv.columns[column.name][order].reshape(shape)
-        return tuple(Table(column.name, column.unit, times, row, entry.interpolation, breaks) for row in values.T)
+        found = (Table(column.name, column.unit, times, row, entry.interpolation, breaks) for row in values.T)
+        return tuple(in_air(vehicle, table, column.name) for table in found)
 
     forward = csv.columns["forward_of_gimbal"][order].reshape(shape)[0]
     found = StationLoads(stations, forward, {column.name: tables(column) for column in columns})

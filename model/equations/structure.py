@@ -17,8 +17,9 @@ def _planes(file: VehicleFile) -> str:
     own = [f"{name} with its own {', '.join(own)}" for name in ("pitch", "yaw") if (own := _own(file, name))]
     each = [name for name, noise in file.noise.items() if noise.planes == "each"] if file.planes == "both" else []
     turns = ["azimuth turns along the flight"] if file.planes == "both" and file.wind.azimuth_change else []
-    parts = [file.planes, f"wind {file.wind.pitch_wind} in pitch", *turns, *own, *(f"{name} in each" for name in each)]
-    return "; ".join(parts)
+    speed = ["speed through the mean wind"] if file.wind.air_speed == "mean_wind" else []
+    apart = (f"{name} in each" for name in each)
+    return "; ".join([file.planes, f"wind {file.wind.pitch_wind} in pitch", *turns, *speed, *own, *apart])
 
 
 def _own(file: VehicleFile, plane: str) -> list[str]:
@@ -49,6 +50,7 @@ def structure_in_words(vehicle: Vehicle, states: int, groups: Sequence[TableGrou
         **({"slosh reaction": "true"} if file.options.slosh_reaction else {}),
         **({"noise loads": file.options.noise_loads} if deviating_tables(file) and file.loads else {}),
         **({"biases": biases} if biases else {}),
+        **({"wind-biased programme": "true"} if file.options.wind_biased_programme else {}),
         **({"trajectory's angle of attack": "true"} if file.options.trajectory_angle_of_attack else {}),
         **({"P-delta": "true"} if file.options.p_delta else {}),
         "states": str(states),

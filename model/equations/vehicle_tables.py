@@ -9,6 +9,7 @@ import numpy as np
 
 from ..errors import UnknownNameError
 from ..tables import TableGroup
+from ..vehicle.mean_wind import PROGRAMME
 from ..vehicle.planes import flown_planes
 from ..vehicle.vehicle import Vehicle
 
@@ -26,6 +27,8 @@ def vehicle_tables(vehicle: Vehicle) -> tuple[TableGroup, ...]:
     """Return the table groups of a vehicle: over time, over altitude, and the mean response (zero until computed)."""
     polynomials = [(t.name, t.unit, t.polynomial) for t in vehicle.tables.values()]
     polynomials.append(("altitude_rate", "m/s", vehicle.tables["altitude"].polynomial.derivative()))
+    if PROGRAMME in vehicle.tables:
+        polynomials.append((f"{PROGRAMME}_rate", "rad/s", vehicle.tables[PROGRAMME].polynomial.derivative()))
     met = met_altitude_name(vehicle)
     if vehicle.zones is not None:
         polynomials.append((met, "m", vehicle.met_altitude))

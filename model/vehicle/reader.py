@@ -54,6 +54,7 @@ from .columns import (
 )
 from .coverage import check_intensity, check_joint_correlation, check_schedule, check_winds, loaded_flight
 from .loads import AXIAL_FORCE, lateral_loads, load_name
+from .mean_wind import through_mean_wind, with_biased_programme
 from .names import name_faults
 from .noise_loads import check_noises, form_is_open, form_of_tables, needed_columns, needed_for
 from .planes import BOTH, SECTIONS, flown_planes, own_tables, plane_entry, plane_file, plane_names
@@ -115,6 +116,13 @@ def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehi
     if file.planes != "yaw" and file.options.mean_response == "nonlinear":
         why = f'is of the yaw plane, and planes = "{file.planes}"; set it to "linear"'
         reader.collector.errors.append(DataError(why, file=toml, column="options.mean_response"))
+    for key, asked, why in (
+        ("wind.air_speed", file.wind.air_speed != "no_wind", "the wind of the yaw plane blows across the path"),
+        ("options.wind_biased_programme", file.options.wind_biased_programme, "the tilt programme is that of pitch"),
+    ):
+        if asked and file.planes == "yaw":
+            why = f'changes nothing in planes = "yaw": {why}; fly "pitch" or "both", or leave it out'
+            reader.collector.errors.append(DataError(why, file=toml, column=key))
     if file.options.trajectory_angle_of_attack and file.options.mean_response == "nonlinear":
         why = 'is of the linear mean, and mean_response = "nonlinear"; leave one of them out'
         reader.collector.errors.append(DataError(why, file=toml, column="options.trajectory_angle_of_attack"))
@@ -180,7 +188,9 @@ def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehi
     for plane in flown_planes(vehicle):
         check_plausibility(plane.vehicle)
     _check_coverage(reader, wind, turbulence, start, last.last)
-    return vehicle
+    if file.wind.air_speed == "mean_wind":
+        vehicle = through_mean_wind(vehicle)
+    return with_biased_programme(vehicle) if file.options.wind_biased_programme else vehicle
 
 
 # columns of the trajectory that an option asks for, and it

@@ -272,6 +272,7 @@ class WindEntry(Section):
 
     azimuth_deg: Annotated[float, Field(ge=0, le=360)] | None = None
     azimuth_change: Annotated[bool, STRUCTURE] = False
+    air_speed: Annotated[Literal["no_wind", "mean_wind"], STRUCTURE] = "no_wind"
     pitch_wind: Annotated[Literal["normal", "horizontal"], STRUCTURE] = "normal"
     components: ComponentsEntry | None = None
     synthesis: Annotated[Literal["fitted", "closed_form"] | None, STRUCTURE] = None
@@ -315,6 +316,7 @@ class OptionsEntry(Section):
     noise_loads: NoiseLoads = "moved_line"
     mean_response: Literal["linear", "nonlinear"] = "linear"
     trajectory_angle_of_attack: bool = False
+    wind_biased_programme: bool = False
     extra_outputs: tuple[ExtraOutput, ...] = ()
     gust_zones: Annotated[Whole, Field(ge=1)] | None = None
 

@@ -92,7 +92,7 @@ def run(
     from ..views.along_vehicle_files import prepare_along_vehicle, write_along_vehicle
     from ..views.azimuth_sweep import check_turns, checked_azimuths
     from ..views.resultants_along_vehicle import write_resultants_along
-    from ..views.trajectory_angle import in_words, trajectory_angle, trajectory_angle_csv
+    from ..views.trajectory_angle import air_speed_in_words, in_words, trajectory_angle, trajectory_angle_csv
 
     chances = checked_probabilities(probability) if probability else ()
     settings = {"method": method, "relative_tolerance": tolerance}
@@ -183,8 +183,8 @@ def run(
     _print_peaks(statistics)
     if both is not None:
         _print_resultants(both)
-    if own is not None:
-        for sentence in in_words(own):
+    if flown.file.planes != "yaw":
+        for sentence in (*(in_words(own) if own is not None else ()), air_speed_in_words(flown, end_times)):
             console.print(sentence, style="dim", markup=False, highlight=False, soft_wrap=True)
     for chance in chances:
         _print_instant_levels(statistics, chance)

@@ -1,4 +1,4 @@
-"""The angle of attack of the flight without wind itself, and the wind that would make it."""
+"""What the means of the pitch plane leave out or take in: the flight's own angle of attack, head- and tailwind."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import xarray as xr
 
+from ...model.vehicle.mean_wind import GROUND_VELOCITY, air_speed, speed_without_wind
 from ...model.vehicle.planes import plane_names
 from ...model.vehicle.vehicle import Vehicle
 
@@ -60,6 +61,25 @@ def in_words(found: xr.Dataset) -> Iterator[str]:
             f"{SIDES[plane][angle > 0]} at {float(at['time']):g} s, where q times it is largest, as much as a wind of "
             f"{wind:.2g} m/s across the path; {fate}."
         )
+
+
+def air_speed_in_words(vehicle: Vehicle, times: Sequence[float]) -> str:
+    """Return what the mean wind makes of speed and dynamic pressure where that is largest, as a sentence.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        That flies in pitch or both planes.
+    times : sequence of float
+        s.
+    """
+    time = times[int(np.argmax(vehicle.tables["dynamic_pressure"].polynomial(times)))]
+    without, through = float(speed_without_wind(vehicle).polynomial(time)), float(air_speed(vehicle, time))
+    fate = "taken in" if GROUND_VELOCITY in vehicle.tables else 'left out: wind.air_speed = "mean_wind" takes it in'
+    return (
+        f"The mean wind makes the speed through the air {through:.1f} m/s instead of {without:.1f} m/s at {time:g} s "
+        f"and changes the dynamic pressure by {100 * ((through / without) ** 2 - 1):+.1f} %; {fate}."
+    )
 
 
 def trajectory_angle_csv(found: xr.Dataset) -> str:
