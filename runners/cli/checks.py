@@ -55,6 +55,7 @@ def verify(
             title = f"{study.system.name}: simulated flights and the adjoint's mean ± 3σ"
             adjoint = study.response_statistics(at, engine="cvodes")
             figure = sample_path_figure(found.statistics["ensemble"].dataset, adjoint.dataset, title)
+        job.replace_earlier("verify", study)
         job.written += write_figure(figure, job.folder, "sample_paths")
         job.end()
     console.print(found.verdict(), style="green" if found.agree else "bold red", highlight=False)
@@ -160,6 +161,7 @@ def tolerance(
             f"{1e3 * pace.newton_step:.0f} ms", _root(pace.accuracy_root), pace.pacing_state,
         )  # fmt: skip
     print_table(table, console)
+    job.replace_earlier("tolerance", study)
     figure = tolerance_figure(measured, paces, f"{study.system.name}: end times {named} s")
     job.written += write_figure(figure, job.folder, "tolerance")
     job.end()

@@ -9,6 +9,8 @@ from typing import Any
 import typer
 from typer.core import TyperGroup
 
+from .frame import frame_group, framed
+
 FILES = {  # command: its file in this folder, where a function or a group of that name stands
     "run": "run",
     "flight-load": "flight_load",
@@ -51,8 +53,10 @@ class Commands(Mapping[str, Any]):
             found = getattr(module, name.replace("-", "_"))
             if not isinstance(found, typer.Typer):
                 alone = typer.Typer(add_completion=False)
-                alone.command(name)(found)
+                alone.command(name)(framed(found, name))
                 found = alone
+            else:
+                frame_group(found, name)
             self.made[name] = typer.main.get_command(found)
             self.made[name].name = name
         return self.made[name]

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from rich.progress import Progress
 
 from ...model.errors import UnknownNameError, UnusedOptionError
-from ..present.terminal import console, progress_bar, warned
+from ..present.terminal import console, machine_reads, progress_bar, warned
 from .terminal import parse_changes
 
 if TYPE_CHECKING:
@@ -144,6 +144,9 @@ class Job:
         if not isinstance(of, str):
             about, name = about | description(of), of.system.name
         self.manifest = Manifest.begin(self.folder, command, str(name), about)
+        if count := len(self.manifest.earlier):
+            said = f"{self.folder} holds an earlier '{command}': its {count} files are replaced"
+            console.print(said, style="dim", soft_wrap=True, markup=False, highlight=False)
 
     def end(self) -> None:
         """Print what was written and where, and what became of an earlier run's files.
@@ -167,6 +170,8 @@ def typed() -> str:
 
 def print_files(written: Iterable[Path], folder: Path) -> None:
     """Print the last line of a command: the files it wrote, by their place in a folder."""
+    written = list(written)
+    machine_reads.wrote(written, folder)
     names = [path.relative_to(folder).as_posix() for path in written]
     count = "1 file" if len(names) == 1 else f"{len(names)} files"
     console.print(f"{count} in {folder}: {', '.join(names)}", soft_wrap=True)

@@ -45,5 +45,6 @@ def mean(
     print_whole(table, console)
     if job:
         title = f"{study.system.name}: mean response in the mean wind"
+        job.replace_earlier("mean", study)
         job.written += write_figure(mean_comparison_figure(found, title), job.folder, "mean_response")
         job.end()

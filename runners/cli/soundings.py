@@ -72,8 +72,9 @@ def read(
         table.add_row(*row)
     print_table(table, console)
     if out is not None:
+        written = "written over the profiles that stood in" if out.exists() else "written to"
         write_text(out, soundings_text(found))
-        console.print(f"written to {out}", soft_wrap=True)
+        console.print(f"{written} {out}", soft_wrap=True)
 
 
 def parse_levels(text: str) -> list[float]:

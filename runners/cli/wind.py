@@ -297,6 +297,7 @@ def _print_normality(soundings: Path, component: str, folder: Path) -> None:
             f"{100 * found.beyond[i]:.1f} %", f"{found.tail_probability[i]:.2g}", f"{100 * found.far_beyond[i]:.2f} %",
         )  # fmt: skip
     print_table(table, console)
+    job.replace_earlier("wind-stats", read.source)
     job.written += write_figure(normality_figure(read, f"{read.source}, {read.period}"), folder, "normality")
     job.end()
 
@@ -343,12 +344,13 @@ def fit(
         else f" --soundings {soundings.name} --component {component} --top {s.altitude[-1]:g}"
     )
     made = replace(made, source=f"{made.source}; written by '{command}'")
+    written = "written over the one that stood in" if out.exists() else "written to"
     write_text(out, filter_text(made))
     state = "converged" if result.converged else f"NOT converged: {result.message}"
     console.print(
         f"{method}, order {result.shaping_filter.order}, {state} in {result.seconds:.1f} s: "
         f"{result.rms_error:.3g} m²/s² rms, {100 * result.share_inside():.1f} % inside the 90 % interval; "
-        f"written to {out}",
+        f"{written} {out}",
         soft_wrap=True,
     )
 

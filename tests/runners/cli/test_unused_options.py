@@ -20,6 +20,8 @@ times = "70,75"
 "control.T1.gain" = [0.9, 1.1]
 """
 
+FRAME = ("json", "as_json")  # of every command, by its frame
+
 # what is typed, and what must be said
 UNUSED = [
     *(
@@ -86,8 +88,9 @@ UNUSED = [
 KNOWN = {
     "run": {
         "system", "times", "out", "engine", "method", "tolerance", "turbulence", "changes", "along_vehicle",
-        "probability", "azimuths",
+        "probability", "azimuths", "report",
     },
+    "report": {"out"},
     "flight-load": {
         "window", "response", "probability", "limit", "sides", "sensitivity", "wind_error", "draws", "seed", "out",
         "turbulence", "changes",
@@ -105,7 +108,7 @@ KNOWN = {
     },
     "vehicles": set(),
     "new-vehicle": {"source"},
-    "inspect": {"time", "json", "changes"},
+    "inspect": {"time", "changes"},
     "regenerate": {"out", "changes"},
     "doctor": set(),
     "cache": {"clean"},
@@ -157,7 +160,7 @@ def test_an_option_that_changes_nothing_is_refused(here, arguments, says):
 
 def test_every_option_was_looked_at():
     def options(command) -> set[str]:
-        return {p.name for p in command.params if p.param_type_name == "option"} - {"help"}
+        return {p.name for p in command.params if p.param_type_name == "option"} - {"help", *FRAME}
 
     found, whole = {}, typer.main.get_command(app)
     assert isinstance(whole, TyperGroup)
