@@ -42,20 +42,20 @@ def gust_products(weights: WindWeights, climb: Climb, gust: Gust, starts: NDArra
         corners = np.append(corners, np.full((starts.size, 1), weights.time), axis=1)
     found = np.zeros((starts.size, weights.direct.size))
     for spline, low, high in zip(weights.pieces, weights.edges[:-1], weights.edges[1:], strict=True):
-        cut = np.clip(corners, low, high)
+        cut, points = np.clip(corners, low, high), spline.t[(spline.t >= low) & (spline.t <= high)]
+        panel = min(PANEL, POINTS * float(np.diff(points).max(initial=0.0)) or PANEL)
         for begin, end in pairwise(cut.T):
-            found += _integral(spline, climb, gust, starts, begin, end)
+            found += _integral(spline, climb, gust, starts, begin, end, panel)
     now = gust.at(climb.altitude(weights.time) - starts)
     return found + now[:, None] * weights.direct
 
 
-def _integral(spline, climb: Climb, gust: Gust, starts: NDArray, begin: NDArray, end: NDArray) -> NDArray:
+def _integral(spline, climb: Climb, gust: Gust, starts: NDArray, begin: NDArray, end: NDArray, panel: float) -> NDArray:
     """Return the integral of wind times weights from begin to end (s), (p, r), where both are smooth."""
     met = np.flatnonzero(end > begin)
     if not met.size:
         return np.zeros((starts.size, spline.c.shape[1]))
     begin, span = begin[met], (end - begin)[met]
-    panel = min(PANEL, POINTS * float(np.diff(spline.t).max()))
     panels = max(1, int(np.ceil(float(span.max()) / panel - 1e-9)))
     offsets = ((np.arange(panels)[:, None] + 0.5 * (1 + NODES)) / panels).ravel()
     times = begin[:, None] + span[:, None] * offsets

@@ -20,8 +20,11 @@ from ..case.case import Case
 from ..solvers.discretisation import exact_transitions
 from ..solvers.time_nodes import Interval, interval_before, intervals, time_nodes
 
-SPACING, RADIANS = 0.02, 0.4  # s, and of the fastest oscillation, at most, between points
+SPACING, RADIANS = 0.02, 0.25  # s, and of the fastest oscillation that lasts, at most, between points
 FINER, FINE = 4, 0.2  # times finer in the last seconds before t2, where what decays fast has not decayed
+LASTING = 20.0  # 1/s: what decays faster has points of its own close to t2, and none elsewhere
+LAYER, SPREAD = 0.15, 36.0  # rad of such a mode between points at t2, and its decays in which they spread e-fold
+IN_PIECE = 6  # steps in which the product is integrated at once there
 DEGREE = 5  # of the splines between points
 
 
@@ -34,7 +37,8 @@ class WindWeights:
     time : float
         t2, s.
     pieces : tuple of BSpline
-        g(t2, t) between jumps of the flight, (..., r) per m, in order of time.
+        g(t2, t), (..., r) per m, in order of time; the same one several times where the flight does not jump but
+        points get closer towards t2.
     edges : (pieces + 1,) array
         s; the first is where the weights begin, the last t2.
     direct : (r,) array
@@ -61,9 +65,46 @@ class WindWeights:
 
 
 def spacing_of(case: Case, begin: float, end: float) -> float:
-    """Return the distance of points (s) that the fastest oscillation between two flight times (s) asks for."""
-    fastest = max(float(np.linalg.eigvals(case.matrices(t)[0]).imag.max()) for t in np.linspace(begin, end, 5))
+    """Return the distance of points (s) that the fastest oscillation that lasts asks for between two times (s)."""
+    modes = np.concatenate([np.linalg.eigvals(case.matrices(t)[0]) for t in np.linspace(begin, end, 5)])
+    fastest = float(modes.imag[modes.real > -LASTING].max(initial=0.0))
     return min(SPACING, RADIANS / fastest) if fastest > 0 else SPACING
+
+
+@dataclass(frozen=True, eq=False)
+class Layer:
+    """Points close to an end time.
+
+    Attributes
+    ----------
+    points : (k,) array
+        s, increasing to the end time.
+    cuts : tuple of float
+        Those between which an integral is taken at once, where points are closest, s.
+    """
+
+    points: NDArray[np.float64]
+    cuts: tuple[float, ...]
+
+    @classmethod
+    def of(cls, case: Case, node: float, spacing: float) -> Layer:
+        """Return points that grow apart to ``spacing`` (s).
+
+        What a spline misses of a mode that decays fast does so too. Delays of gust zones that are metres apart are such
+        modes, several of nearly the same rate.
+        """
+        modes = np.linalg.eigvals(case.matrices(node)[0])
+        fast = modes[modes.real <= -LASTING]
+        away, closest = [0.0], 0
+        while True:
+            step = spacing / FINER if away[-1] < FINE else spacing
+            own = LAYER / np.abs(fast) * np.exp(np.minimum(-fast.real * away[-1] / SPREAD, 50.0))
+            finest = float(own.min(initial=np.inf))
+            if step == spacing and finest >= spacing:
+                break
+            closest += finest < FINER * step
+            away.append(away[-1] + min(step, finest))
+        return cls(node - np.array(away[::-1]), tuple(node - x for x in away[closest:0:-IN_PIECE]))
 
 
 def wind_weights(
@@ -150,12 +191,15 @@ class WeightGrid:
         Phi of each step.
     inputs : tuple of (k, n) arrays
         E of the wind at the points of each piece, its ends from inside.
+    layers : dict of float to Layer
+        Of each node, s.
     """
 
     times: NDArray[np.float64]
     pieces: tuple[Interval, ...]
     transition: NDArray[np.float64]
     inputs: tuple[NDArray[np.float64], ...]
+    layers: dict[float, Layer]
 
     @classmethod
     def of(cls, case: Case, begin: float, nodes: NDArray[np.float64], spacing: float) -> WeightGrid:
@@ -163,11 +207,12 @@ class WeightGrid:
         executable, wind = case.with_means, case.wind_input("a gust")
         pieces = tuple(intervals(executable, begin, float(nodes[-1]))) if nodes[-1] > begin else ()
         marks = np.unique([begin, *nodes.tolist(), *(piece.end for piece in pieces)])
-        parts = []
+        parts, layers = [], {float(node): Layer.of(case, float(node), spacing) for node in nodes}
         for a, b in pairwise(marks):
-            last = max(a, b - FINE) if b in nodes else b
-            for low, high, step in ((a, last, spacing), (last, b, spacing / FINER)):
-                parts.append(np.linspace(low, high, int(np.ceil((high - low) / step - 1e-9)) + 1)[:-1])
+            close = layers[float(b)].points if b in nodes else np.array([b])
+            close = close[close > a]
+            parts.append(np.linspace(a, close[0], int(np.ceil((close[0] - a) / spacing - 1e-9)) + 1)[:-1])
+            parts.append(close[:-1])
         times = np.concatenate([*parts, marks[-1:]])
         steps, inputs = [], []
         for piece in pieces:
@@ -176,7 +221,7 @@ class WeightGrid:
             inputs.append(executable.input_matrices(at, piece.low, piece.high)[1][:, :, wind])
         n = len(case.system.states)
         transition = exact_transitions(executable, steps) if steps else np.zeros((0, n, n))
-        return cls(times, pieces, transition, tuple(inputs))
+        return cls(times, pieces, transition, tuple(inputs), layers)
 
     def adjoint(self, rows: NDArray[np.float64], last: int, first: int = 0) -> NDArray[np.float64]:
         """Return rows (r, n) of the states at point ``last`` carried back to each point, (last - first + 1, r, n)."""
@@ -197,6 +242,7 @@ class WeightGrid:
                 continue
             at = self.times[whole[mine]]
             values = np.einsum("krn,kn->kr", adjoint[whole[mine] - first], E[mine])
-            splines.append(make_interp_spline(at, values, k=DEGREE if at.size > DEGREE else 1))
-            edges.append(float(at[-1]))
+            cut = [x for x in self.layers[node].cuts if at[0] < x < at[-1]]
+            splines += [make_interp_spline(at, values, k=DEGREE if at.size > DEGREE else 1)] * (1 + len(cut))
+            edges += [*cut, float(at[-1])]
         return WindWeights(node, tuple(splines), np.array(edges), direct)
