@@ -426,7 +426,11 @@ class Study(Case):
         return resultant_along_vehicle(self, times, load=load, probability=probability)
 
     def percentile_sensitivity(
-        self, resultant: str, time: float, probability: float = LIKE_3_SIGMA, parameters: Iterable[str] | None = None
+        self,
+        resultant: str,
+        time: float | Literal["peak"],
+        probability: float = LIKE_3_SIGMA,
+        parameters: Iterable[str] | None = None,
     ) -> xr.Dataset:
         """Return the derivatives of a percentile of a resultant of both planes, by all parameters and tables.
 
@@ -434,8 +438,8 @@ class Study(Case):
         ----------
         resultant : str
             Such as 'resultant_bending_moment' or 'total_angle_of_attack'.
-        time : float
-            End time t2, s.
+        time : float or 'peak'
+            End time t2, s; 'peak' is the time of the largest level, located between output times.
         probability : float
             Probability with which the resultant exceeds its level at that instant; by default 1 - Phi(3).
         parameters : iterable of str, optional

@@ -66,13 +66,14 @@ def flight_load(
     from ..flight_load.files import write_flight_loads, write_passage, write_sensitivities
     from ..flight_load.limit_table import Limits
     from ..flight_load.limits import checked_limits
-    from ..flight_load.load import DESIGN, checked_load
+    from ..flight_load.load import DESIGN
     from ..flight_load.margin_figure import margin_figure
     from ..flight_load.request import NoVarianceError, checked_draws
     from ..flight_load.uncertain_parameter import checked_spread
     from ..flight_load.window import checked_window
     from ..present.style import words, write_figure
     from ..statistics.percentiles import checked_probabilities, checked_sides
+    from ..statistics.resultants import response_or_resultant
 
     asked, chosen = checked_probabilities(probability or [DESIGN]), checked_sides(sides)
     flown = None if window is None else parse_window(window)
@@ -83,7 +84,11 @@ def flight_load(
     study = load_study(
         vehicle, changes, ["title", "default_times"] if window is None else ["title"], turbulence=turbulence
     )
-    names = [checked_load(study, name) for name in dict.fromkeys(response)] if response else known_loads(study, chosen)
+    names = (
+        [response_or_resultant(study, name) for name in dict.fromkeys(response)]
+        if response
+        else known_loads(study, chosen)
+    )
     flown = checked_window(study, flown)
     if limits is not None:
         checked_limits(study, limits, flown)

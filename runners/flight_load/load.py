@@ -13,7 +13,7 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy.special import ndtri_exp
 
-from ...model.errors import ParameterValueError, PlanesError, UnknownNameError
+from ...model.errors import ParameterValueError
 from ..case.case import Case
 from ..case.provenance import provenance, wind_samples
 from ..statistics.percentiles import (
@@ -22,7 +22,7 @@ from ..statistics.percentiles import (
     checked_sides,
     monte_carlo_runs,
 )
-from ..statistics.resultants import resultant_name, resultant_pairs
+from ..statistics.resultants import response_or_resultant
 from ..statistics.sampling_interval import checked_samples
 from .crossings import Boundary
 from .limit_table import LimitError, Limits, limits_over_time
@@ -572,26 +572,6 @@ class FlightLoad:
         return xr.DataArray(np.array(list(values)), coords, ("probability", *more), attrs=attributes)
 
 
-def checked_load(case: Case, name: str) -> str:
-    """Return the name of a response or a resultant.
-
-    Raises
-    ------
-    UnknownNameError, DirectNoiseError
-    PlanesError
-        It is the resultant of a response of one plane.
-    """
-    pairs = resultant_pairs(case.system.output_names)
-    if name in pairs:
-        case.checked_responses(pairs[name])
-        return name
-    if name in {resultant_name(output) for output in case.system.output_names}:
-        raise PlanesError.of_one(f"'{name}'", case.system.name)
-    if pairs and name not in case.system.output_names:
-        raise UnknownNameError("response or resultant", str(name), [*case.system.output_names, *pairs])
-    return case.checked_responses([name])[0]
-
-
 def flight_load(
     case: Case,
     response: str,
@@ -603,7 +583,7 @@ def flight_load(
     limit: str | Path | Limits | float | None = None,
 ) -> FlightLoad:
     """See :meth:`Study.flight_load`."""
-    name, sided = checked_load(case, response), checked_sides(sides)
+    name, sided = response_or_resultant(case, response), checked_sides(sides)
     checked_draws(draws, seed)
     asked = checked_probabilities(probabilities)
     flown = checked_window(case, window)

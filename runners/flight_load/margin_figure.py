@@ -37,7 +37,7 @@ def margin_figure(load: FlightLoad, title: str) -> Figure:
         axes.plot(times, factor * level, color=COLORS["combined"], lw=2,
                   label=f"passed with {passage.design:g} at each instant")  # fmt: skip
         axes.fill_between(times, factor * level, factor * limit, where=limit > level, color="#3a923a", alpha=0.12, lw=0)
-        label = "of the means alone" if load.of.is_resultant else "mean"
+        label = "resultant of the means" if load.of.is_resultant else "mean"
         axes.plot(times, factor * size, color=COLORS["mean"], lw=1.6, label=label)
         axes.set(xlabel="flight time (s)", ylabel=f"{words(load.response)} ({unit})", xlim=load.window)
         axes.set_ylim(min(0.0, axes.get_ylim()[0]), None)

@@ -21,12 +21,15 @@ LABELS = {LARGER_SIDE: LABEL, "std": "σ", "variance": "variance", "mean": "mean
 def heading(found: xr.Dataset) -> str:
     """Return what was differentiated, in words: '|mean| + 3σ (mean + 3σ) bending moment at 74.7 s: 24.7 MN m'."""
     a = found.attrs
+    factor, unit = display(a["response_unit"], a["value"])
+    if "probability" in a:
+        chance = f"passed with {a['probability']:.3g} at {a['t2_s']:.4g} s"
+        return f"the level of {words(a['response'])} {chance}: {factor * a['value']:.4g} {unit}"
     source = "" if a["source"] == COMBINED else f" from {words(a['source'])} alone"
     label = LABELS[a["quantity"]] + (f" ({side(a['mean'])})" if a["quantity"] == LARGER_SIDE else "")
     what = f"{label} {words(a['response'])}{source} at {a['t2_s']:.4g} s"
     if a["quantity"] == "variance":
         return what
-    factor, unit = display(a["response_unit"], a["value"])
     return f"{what}: {factor * a['value']:.4g} {unit}"
 
 

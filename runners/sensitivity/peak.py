@@ -36,7 +36,7 @@ def peak_time(case: Case, request: Request) -> tuple[float, bool]:
     TimeRangeError
         If the system has no end.
     """
-    times = _with_sides(case, _range(case))
+    times = searched_times(case)
     scan = response_statistics(case, times, responses=[request.response])
     mean, variance = (scan[name].sel(source=request.source).values[:, 0] for name in ("mean", "variance"))
     best = int(np.argmax([request.sought(float(v), float(m)) for v, m in zip(variance, mean, strict=True)]))
@@ -66,6 +66,16 @@ def peak_time(case: Case, request: Request) -> tuple[float, bool]:
             )
     found = max(candidates, key=lambda t: quantity(t)[0])
     return found, found in (times[0], times[-1])
+
+
+def searched_times(case: Case) -> list[float]:
+    """Return the end times among which a peak is looked for: default times, or the flight, both sides of each switch.
+
+    Raises
+    ------
+    TimeRangeError
+    """
+    return _with_sides(case, _range(case))
 
 
 def _with_sides(case: Case, times: list[float]) -> list[float]:

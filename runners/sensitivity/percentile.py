@@ -11,14 +11,14 @@ so that two adjoint pairs, of the linear forms v_k . M, give all derivatives, co
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
 from ...codegen.nodes.compiled import node_functions_of
-from ...model.errors import PlanesError, UnknownNameError
+from ...model.errors import PlanesError, TimeRangeError, UnknownNameError
 from ...model.system.names import COMBINED
 from ..case.provenance import provenance
 from ..solvers.flight_nodes import FlightNodes
@@ -26,13 +26,13 @@ from ..solvers.stability import warn_if_unstable
 from ..statistics.engines import response_statistics
 from ..statistics.norm import NormOfNormal
 from ..statistics.percentiles import checked_probabilities
-from ..statistics.resultants import resultant_pairs
+from ..statistics.resultants import response_or_resultant, resultant_pairs
 from ..statistics.sweep import Sweep
 from .gradient import Gradient, gradient_of
 from .knots import knot_sensitivities
 from .one import parameter_sensitivities, refuse_undefined
 from .pair import AdjointPair
-from .peak import check_end_time
+from .peak import check_end_time, searched_times
 from .request import parameter_rows
 from .start import StartShare, start_share
 from .tables import TotalDensity, table_sensitivities, total_density
@@ -42,11 +42,16 @@ if TYPE_CHECKING:
 
     from ..case.case import Case
 
+ROUNDS = 6  # of finer end times about a peak, each five times as fine
 ACCURATE = 1e-9  # relative tolerance of mean and covariance, whose derivatives of a percentile are taken
 
 
 def percentile_sensitivity(
-    case: Case, resultant: str, time: float, probability: float, parameters: Iterable[str] | None = None
+    case: Case,
+    resultant: str,
+    time: float | Literal["peak"],
+    probability: float,
+    parameters: Iterable[str] | None = None,
 ) -> xr.Dataset:
     """See :meth:`Study.percentile_sensitivity`."""
     pairs = resultant_pairs(case.system.output_names)
@@ -55,11 +60,16 @@ def percentile_sensitivity(
     if resultant not in pairs:
         raise UnknownNameError("resultant", resultant, pairs)
     (probability,) = checked_probabilities(probability)
+    names = pairs[resultant]
+    response_or_resultant(case, resultant)
+    rows = parameter_rows(case, parameters)
+    at_peak, at_limit = isinstance(time, str), False
+    if isinstance(time, str):
+        if time != "peak":
+            raise TimeRangeError(f"'{time}' is not a time; give seconds or 'peak'")
+        time, at_limit = _peak_time(case, names, probability)
     (time,) = case.checked_times([time])
     check_end_time(case, time)
-    rows = parameter_rows(case, parameters)
-    names = pairs[resultant]
-    case.checked_responses(names)
     warn_if_unstable(case.executable, time)
     law = _law(case, names, time)
     level = float(law.percentile(probability))
@@ -85,6 +95,9 @@ def percentile_sensitivity(
         "quantity": f"level passed with {probability:g}",
         "t2_s": time,
         "value": level,
+        "at_peak": int(at_peak),
+        "peak_at_end_of_range": int(at_limit),
+        "probability": probability,
         "direction_rad": float(direction.most_likely),
         "derivative_by_mean": by_mean.tolist(),
         "derivative_by_covariance": by_covariance.ravel().tolist(),
@@ -129,9 +142,32 @@ def two_forms(
 
 
 def _law(case: Case, names: tuple[str, str], time: float) -> NormOfNormal:
-    statistics = response_statistics(case, [time], responses=names, engine=Sweep(relative_tolerance=ACCURATE))
-    law = statistics.norm(*names)
+    law = _laws(case, names, [time])
     return NormOfNormal(law.mean[0], law.covariance[0])
+
+
+def _laws(case: Case, names: tuple[str, str], times: list[float]) -> NormOfNormal:
+    compiled = case.executable.shared_library is not None
+    engine = Sweep(relative_tolerance=ACCURATE) if compiled else "covariance"
+    return response_statistics(case, times, responses=names, engine=engine).norm(*names)
+
+
+def _peak_time(case: Case, names: tuple[str, str], probability: float) -> tuple[float, bool]:
+    """Return the time of the largest level between output times, and whether it is an end of the range searched.
+
+    The neighbourhood of the largest is cut finer and finer: to 1e-4 of the time between two output times.
+    """
+    times = searched_times(case)
+    first, last = times[0], times[-1]
+    best = times[int(np.argmax(_laws(case, names, times).percentile(probability)))]
+    if best in (first, last):
+        return best, True
+    for _ in range(ROUNDS):
+        k = times.index(best)
+        low, high = times[max(k - 1, 0)], times[min(k + 1, len(times) - 1)]
+        times = sorted({*np.linspace(low, high, 11).tolist(), best})
+        best = times[int(np.argmax(_laws(case, names, times).percentile(probability)))]
+    return best, False
 
 
 def _sum_of_gradients(parts: list[Gradient]) -> Gradient:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -37,7 +38,7 @@ def history_figure(resultants: Resultants, resultant: str, title: str) -> Figure
             values = np.abs(mean[:, k]) + SIGMAS * np.sqrt(covariance[:, k, k])
             axes.plot(time, factor * values, "--", color=SHADES[2 + k], lw=1.4, label=f"{plane} alone, |mean| + 3σ")
         size = np.linalg.norm(mean, axis=1)
-        axes.plot(time, factor * size, color=COLORS["mean"], lw=1.4, label="of the means alone")
+        axes.plot(time, factor * size, color=COLORS["mean"], lw=1.4, label="resultant of the means")
         late = peak.time > 0.4 * time[0] + 0.6 * time[-1]
         axes.annotate(
             f"{factor * peak.value:.3g} {unit} at {peak.time:g} s",
@@ -65,34 +66,37 @@ def direction_figure(resultants: Resultants, resultant: str, title: str) -> Figu
         figure = Figure(figsize=(10.0, 5.8), layout="constrained")
         left = figure.add_subplot(1, 2, 1)
         right: Any = figure.add_subplot(1, 2, 2, projection="polar")
-        _ellipses(left, law, peak, factor, unit)
+        _ellipses(left, law, peak, factor, unit, chance)
         e = np.stack([np.cos(AROUND), np.sin(AROUND)])
         along = law.mean @ e
         toward = along + SIGMAS * np.sqrt(np.einsum("it,ij,jt->t", e, law.covariance, e))
         right.plot(
-            AROUND, factor * np.maximum(toward, 0.0), color=COLORS["wind"], lw=2, label="mean + 3σ of a direction"
+            AROUND, factor * np.maximum(toward, 0.0), color=COLORS["wind"], lw=2, label="mean + 3σ along each direction"
         )
-        right.plot(AROUND, factor * np.maximum(along, 0.0), color=COLORS["mean"], lw=1.4, label="mean of a direction")
+        right.plot(
+            AROUND, factor * np.maximum(along, 0.0), color=COLORS["mean"], lw=1.4, label="mean along each direction"
+        )
         circle = np.full(AROUND.size, factor * peak.value)
         right.plot(AROUND, circle, "--", color=COLORS[COMBINED], lw=1.4, label=f"resultant, passed with {chance:.3g}")
         right.plot([peak.direction], [factor * peak.value], "o", color=COLORS[COMBINED])
+        right.set_rlabel_position(math.degrees(peak.direction) + 180.0 + 22.5)  # away from the peak, between two rays
         right.set_title(f"by direction, from +pitch (0°) towards +yaw (90°), {unit}", fontsize=10)
         right.legend(loc="lower center", bbox_to_anchor=(0.5, -0.42))
         figure.suptitle(wrapped(f"{title}, t = {peak.time:g} s"))
     return figure
 
 
-def _ellipses(axes: Axes, law: NormOfNormal, peak: ResultantPeak, factor: float, unit: str) -> None:
+def _ellipses(axes: Axes, law: NormOfNormal, peak: ResultantPeak, factor: float, unit: str, chance: float) -> None:
     root = np.linalg.cholesky(law.covariance + 1e-14 * np.trace(law.covariance) * np.eye(2))
     unit_circle = np.stack([np.cos(AROUND), np.sin(AROUND)])
     for n in (1, 2, 3):
         x, y = factor * (law.mean[:, None] + n * root @ unit_circle)
         axes.plot(x, y, color=COLORS["wind"], lw=1.4, alpha=1.1 - 0.25 * n, label="1σ, 2σ, 3σ" if n == 1 else None)
     x, y = factor * peak.value * unit_circle
-    axes.plot(x, y, "--", color=COLORS[COMBINED], lw=1.4, label="passed by the resultant")
+    axes.plot(x, y, "--", color=COLORS[COMBINED], lw=1.4, label=f"resultant, passed with {chance:.3g}")
     axes.plot(*(factor * law.mean), "+", color=COLORS["mean"], ms=10, mew=2, label="mean")
     at = factor * peak.value * np.array([np.cos(peak.direction), np.sin(peak.direction)])
-    axes.plot(*at, "o", color=COLORS[COMBINED], label="most likely there")
+    axes.plot(*at, "o", color=COLORS[COMBINED], label="most likely direction there")
     reach = HEADROOM * factor * peak.value
     axes.axhline(0, color="black", lw=0.6)
     axes.axvline(0, color="black", lw=0.6)

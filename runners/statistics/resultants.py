@@ -12,7 +12,7 @@ import io
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -25,6 +25,9 @@ from ..present.files import prepare_folder, write_text
 from ..present.netcdf import RULE, one_unit_a_variable, with_conventions, write_netcdf
 from .norm import NormOfNormal
 from .percentiles import checked_probabilities
+
+if TYPE_CHECKING:
+    from ..case.case import Case
 
 TOTAL = {
     "angle_of_attack": "total_angle_of_attack",
@@ -44,6 +47,32 @@ def resultant_pairs(responses: Iterable[str]) -> dict[str, tuple[str, str]]:
     """Return the resultants that responses have, by name, with both responses."""
     pairs = paired(responses).items()
     return {resultant_name(name): pair for name, pair in pairs if not any(part in name for part in NO_NORM)}
+
+
+def response_or_resultant(case: Case, name: str) -> str:
+    """Return the name of a response or of a resultant of two with one unit.
+
+    Raises
+    ------
+    UnknownNameError, DirectNoiseError
+    PlanesError
+        It is the resultant of a response of one plane.
+    ParameterValueError
+        It is a resultant of responses with different units.
+    """
+    names = case.system.output_names
+    pairs = resultant_pairs(names)
+    if name in pairs:
+        outputs = [case.system.outputs[case.system.output_index(n)] for n in case.checked_responses(pairs[name])]
+        if outputs[0].unit != outputs[1].unit:
+            listed = " and ".join(f"'{o.name}' is in {o.unit}" for o in outputs)
+            raise ParameterValueError(f"{listed}: they have no norm; choose another resultant")
+        return name
+    if name in {resultant_name(output) for output in names}:
+        raise PlanesError.of_one(f"'{name}'", case.system.name)
+    if pairs and name not in names:
+        raise UnknownNameError("response or resultant", str(name), [*names, *pairs])
+    return case.checked_responses([name])[0]
 
 
 def has_resultants(statistics: xr.Dataset) -> bool:

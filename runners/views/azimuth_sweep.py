@@ -117,7 +117,12 @@ def azimuth_figure(found: xr.Dataset, resultant: str, flown: float, title: str) 
         axes = figure.subplots()
         axes.plot(part["azimuth"], factor * part["level"], color=COLORS["combined"], lw=2, marker="o", ms=3)
         axes.axvline(flown, color=COLORS["mean"], lw=1, ls="--")
-        axes.annotate("as flown", (flown, axes.get_ylim()[0]), xytext=(4, 6), textcoords="offset points")
+        axes.margins(y=0.14)
+        axes.annotate(
+            "as flown", (flown, 1.0), xycoords=("data", "axes fraction"), xytext=(4, -4), textcoords="offset points",
+            va="top",
+        )  # fmt: skip
+        axes.set_xticks(range(0, 361, 45))
         what = f"{words(resultant)}, passed with {found.attrs['probability']:.3g} ({unit})"
         axes.set(xlabel="azimuth (deg)", ylabel=what, title=wrapped(title))
     return figure

@@ -77,7 +77,7 @@ def resultants_along_figure(found: xr.Dataset, time: float, title: str) -> Figur
             alone = np.abs(mean[:, k]) + SIGMAS * np.sqrt(np.maximum(covariance[:, k, k], 0.0))
             axes.plot(station, factor * alone, "--", color=SHADES[2 + k], lw=1.4, label=f"{plane} alone, |mean| + 3σ")
         size = np.linalg.norm(mean, axis=1)
-        axes.plot(station, factor * size, color=COLORS["mean"], lw=1.4, label="of the means alone")
+        axes.plot(station, factor * size, color=COLORS["mean"], lw=1.4, label="resultant of the means")
         axes.set_ylim(bottom=0)
         what = f"passed with {found.attrs['probability']:.3g} ({unit})"
         axes.set(xlabel="vehicle station (m)", ylabel=what, title=wrapped(title))

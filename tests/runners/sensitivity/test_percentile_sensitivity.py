@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import casadi as ca
 import numpy as np
 import pytest
 from lag import lag
+from scipy.optimize import brentq
 
 import ascentwind as aw
+from ascentwind.model import define_system
 from ascentwind.model.errors import ParameterValueError, PlanesError, TimeRangeError, UnknownNameError
+from ascentwind.runners.sensitivity.derivative_figures import heading
 from ascentwind.runners.station_loads.loads_along_vehicle import resultant_along_vehicle
 
 MOMENTS = ("pitch_bending_moment", "yaw_bending_moment")
@@ -55,6 +61,44 @@ def test_resultant_along_the_vehicle_at_a_load_station_is_that_of_the_output(bot
     np.testing.assert_allclose(found["level"].values[:, k], law.percentile(), rtol=1e-6)
     combined = found["plane_covariance"].sel(source="combined").values[:, k]
     np.testing.assert_allclose(combined, law.covariance, rtol=1e-5)
+
+
+@pytest.fixture(scope="module")
+def swelling(cache) -> aw.Study:
+    """Two Brownian motions through outputs that swell and fade: both planes have sigma a sqrt(t) sin(pi t / 2)."""
+    t, x, y, n, m, a = (ca.SX.sym(name) for name in ("t", "x", "y", "n", "m", "a"))
+    gain = ca.sin(np.pi * t / 2)
+    system = define_system(
+        "swelling",
+        time=t,
+        states={"x": (x, n), "y": (y, m)},
+        noises={"n": n, "m": m},
+        parameters={"a": (a, 3.0)},
+        outputs={"pitch_load": a * gain * x, "yaw_load": a * gain * y, "pitch_angle": x, "yaw_angle": y},
+        end=2.0,
+    )
+    units = {"pitch_angle": "rad", "yaw_angle": "deg"}
+    outputs = tuple(replace(o, unit=units.get(o.name, "N m")) for o in system.outputs)
+    return aw.Study.from_system(replace(system, outputs=outputs))
+
+
+def test_the_peak_of_a_level_between_output_times(swelling):
+    """Rayleigh's level sigma sqrt(-2 ln p) is largest where 1 / 2 t + (pi / 2) / tan(pi t / 2) vanishes."""
+    found = swelling.percentile_sensitivity("resultant_load", "peak", 0.01)
+    time = brentq(lambda t: 0.5 / t + 0.5 * np.pi / np.tan(0.5 * np.pi * t), 1.0, 1.9)
+    assert found.attrs["t2_s"] == pytest.approx(time, abs=1e-4)
+    level = 3.0 * np.sqrt(time) * np.sin(np.pi * time / 2) * np.sqrt(-2 * np.log(0.01))
+    assert found.attrs["value"] == pytest.approx(level, rel=1e-7)
+    assert float(found["derivative"][0]) == pytest.approx(level / 3.0, rel=1e-7)
+    assert (found.attrs["at_peak"], found.attrs["peak_at_end_of_range"]) == (1, 0)
+    assert heading(found).startswith("the level of resultant load passed with 0.01 at 1.169 s: 9.499")
+
+
+def test_refused_of_a_small_system(swelling):
+    with pytest.raises(TimeRangeError, match="give seconds or 'peak'"):
+        swelling.percentile_sensitivity("resultant_load", "largest")
+    with pytest.raises(ParameterValueError, match="'pitch_angle' is in rad and .* no norm"):
+        swelling.percentile_sensitivity("resultant_angle", 1.0)
 
 
 def test_refused():
