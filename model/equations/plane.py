@@ -82,7 +82,7 @@ def plane_equations(plane: Plane, numbers: Numbers, turbulence: ca.SX, winds: Wi
     if WIND_BIAS in numbers.biases:
         deviation = numbers.biases[WIND_BIAS].deviation
         met = [wind + deviation * expected for wind, expected in zip(met, winds.expected, strict=True)]
-    across = in_plane(plane, numbers, met) + _of_turned_path(plane, numbers, winds.mean)
+    across = in_plane(plane, numbers, met) + _of_turned_path(plane, numbers, winds.expected)
     zones = penetration(across + turbulence, numbers.zones, numbers.tables)
     own = _own_angle(plane, numbers)
     alpha = rigid_body.angle_of_attack(numbers.tables, motion.attitude, motion.lateral_velocity, zones.reference) + own
@@ -120,40 +120,63 @@ def in_plane(plane: Plane, numbers: Numbers, winds: Sequence[ca.SX]) -> ca.SX:
     over.
     """
     if len(winds) == 1:
-        wind = winds[0]
-    else:
-        sine, cosine, (u, v) = ca.sin(numbers.azimuth), ca.cos(numbers.azimuth), winds
-        wind = u * sine + v * cosine if plane.name == "pitch" else u * cosine - v * sine
-    if plane.name == "yaw" or plane.vehicle.file.wind.pitch_wind == "horizontal":
-        return wind
-    return numbers.tables["altitude_rate"] / numbers.tables["relative_velocity"] * wind
+        return winds[0] if plane.name == "yaw" else _share(plane, numbers) * winds[0]
+    along, across = _of_heading(numbers, winds)
+    return _in_body(plane, numbers, _share(plane, numbers) * along, across)
 
 
-def _of_turned_path(plane: Plane, numbers: Numbers, mean: Sequence[ca.SX]) -> ca.SX:
-    """Return what the mean wind across the path in pitch is more than its deviations' share, m/s.
+def _of_heading(numbers: Numbers, winds: Sequence[ca.SX]) -> tuple[ca.SX, ca.SX]:
+    """Return the wind along the heading and to the right of it, m/s."""
+    sine, cosine, (u, v) = ca.sin(numbers.azimuth), ca.cos(numbers.azimuth), winds
+    return u * sine + v * cosine, u * cosine - v * sine
+
+
+def _share(plane: Plane, numbers: Numbers) -> ca.SX:
+    """Return how much of a wind along the heading is across the path."""
+    if plane.vehicle.file.wind.pitch_wind == "horizontal":
+        return ca.SX(1)
+    return numbers.tables["altitude_rate"] / numbers.tables["relative_velocity"]
+
+
+def _in_body(plane: Plane, numbers: Numbers, pitch: ca.SX, yaw: ca.SX) -> ca.SX:
+    """Return what a vehicle's plane has of something in pitch and in yaw of the flight, from which it may be rolled."""
+    own, other = (pitch, yaw) if plane.name == "pitch" else (yaw, -pitch)
+    if numbers.roll is None:
+        return own
+    return ca.cos(numbers.roll) * own + ca.sin(numbers.roll) * other
+
+
+def _of_turned_path(plane: Plane, numbers: Numbers, expected: Sequence[ca.SX]) -> ca.SX:
+    """Return what the expected wind across the path in pitch is more than its deviations' share, m/s.
 
     The path through the mean wind is turned against that over the ground: a deviation is met by hdot / V_air of it, and
     the mean itself, by the law of sines, by hdot / V_ground. One speed makes both the same.
     """
     tables = numbers.tables
-    if GROUND_VELOCITY not in tables or plane.name == "yaw" or plane.vehicle.file.wind.pitch_wind == "horizontal":
+    if GROUND_VELOCITY not in tables or plane.vehicle.file.wind.pitch_wind == "horizontal":
         return ca.SX(0)
-    return (tables["relative_velocity"] / tables[GROUND_VELOCITY] - 1) * in_plane(plane, numbers, mean)
+    along = expected[0] if len(expected) == 1 else _of_heading(numbers, expected)[0]
+    more = (tables["relative_velocity"] / tables[GROUND_VELOCITY] - 1) * _share(plane, numbers) * along
+    return _in_body(plane, numbers, more, ca.SX(0)) * numbers.undisturbed
 
 
 def _programme(plane: Plane, numbers: Numbers) -> tuple[ca.SX, ca.SX] | None:
     """Return attitude and rate of the wind-biased programme, where the vehicle flies it."""
-    if plane.name == "yaw" or PROGRAMME not in numbers.tables:
+    if PROGRAMME not in numbers.tables or (plane.name == "yaw" and numbers.roll is None):
         return None
-    attitude, rate = numbers.tables[PROGRAMME], numbers.tables[f"{PROGRAMME}_rate"]
-    return attitude * numbers.undisturbed, rate * numbers.undisturbed
+    told = numbers.tables[PROGRAMME], numbers.tables[f"{PROGRAMME}_rate"]
+    attitude, rate = (_in_body(plane, numbers, of_pitch, ca.SX(0)) * numbers.undisturbed for of_pitch in told)
+    return attitude, rate
 
 
 def _own_angle(plane: Plane, numbers: Numbers) -> ca.SX:
     """Return the angle of attack of the flight without wind itself, rad, where the vehicle's options take it in."""
     if not plane.vehicle.file.options.trajectory_angle_of_attack:
         return ca.SX(0)
-    return numbers.tables[OWN_ANGLE[plane.name].name] * numbers.undisturbed
+    pitch, yaw = (
+        numbers.tables[column.name] if column.name in numbers.tables else ca.SX(0) for column in OWN_ANGLE.values()
+    )
+    return _in_body(plane, numbers, pitch, yaw) * numbers.undisturbed
 
 
 def _with_rates(blocks: Sequence[Block], rates: ca.SX, prefix: str) -> list[Block]:

@@ -18,8 +18,11 @@ def _planes(file: VehicleFile) -> str:
     each = [name for name, noise in file.noise.items() if noise.planes == "each"] if file.planes == "both" else []
     turns = ["azimuth turns along the flight"] if file.planes == "both" and file.wind.azimuth_change else []
     speed = ["speed through the mean wind"] if file.wind.air_speed == "mean_wind" else []
+    if file.planes == "both":
+        each += [bias.source for bias in vehicle_biases(file).values() if not bias.common and bias.unit == "1"]
     apart = (f"{name} in each" for name in each)
-    return "; ".join([file.planes, f"wind {file.wind.pitch_wind} in pitch", *turns, *speed, *own, *apart])
+    roll = [] if file.roll_deg is None else ["rolled"]
+    return "; ".join([file.planes, f"wind {file.wind.pitch_wind} in pitch", *turns, *speed, *roll, *own, *apart])
 
 
 def _own(file: VehicleFile, plane: str) -> list[str]:

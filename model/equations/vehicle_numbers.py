@@ -13,7 +13,6 @@ from ..system.symbols import ParameterSymbols, SharedParameters, TableSymbols
 from ..tables import TableGroup
 from ..vehicle.biases import vehicle_biases
 from ..vehicle.columns import AZIMUTH_CHANGE, ZERO_ANGLE
-from ..vehicle.noise_loads import IN_PLACE
 from ..vehicle.planes import BOTH, Plane
 from ..vehicle.vehicle import Vehicle
 from .control import transfer_function_symbols
@@ -83,6 +82,8 @@ class Numbers:
         Factors on the wind's standard deviation and mean.
     azimuth : SX
         Of the flight at a time, rad; where two components of the wind are turned by it.
+    roll : SX or None
+        By which the vehicle's planes are turned from those of the flight, pitch towards yaw, rad; where it has one.
     sensors : dict of str to Sensor
         Of load relief.
     radii : dict of str to SX
@@ -109,6 +110,7 @@ class Numbers:
     sigma_scale: ca.SX
     mean_scale: ca.SX
     azimuth: ca.SX
+    roll: ca.SX | None
     sensors: dict[str, Sensor]
     radii: dict[str, ca.SX]
     undisturbed: ca.SX
@@ -157,12 +159,15 @@ class Numbers:
                 for n, e in vehicle.noise.items()
             },
             biases={
-                n: shared.process(n, plane, n not in IN_PLACE, partial(bias_process, b, parameters))
+                n: shared.process(n, plane, b.common, partial(bias_process, b, parameters))
                 for n, b in vehicle_biases(vehicle.file).items()
             },
             sigma_scale=parameters.add("wind.sigma_scale", 1.0, "1", "factor on the wind's standard deviation"),
             mean_scale=parameters.add("wind.mean_scale", 1.0, "1", "factor on the mean wind"),
             azimuth=_azimuth(vehicle, tables, parameters),
+            roll=None
+            if vehicle.file.roll_deg is None
+            else parameters.add("roll", math.radians(vehicle.file.roll_deg), "rad", "roll of the vehicle's planes"),
             sensors=sensor_symbols(vehicle.file.control.load_relief, modes, tables, parameters),
             radii={
                 load.output: parameters.add(

@@ -39,6 +39,8 @@ class Bias:
         SI; '1' of a relative error.
     tables : tuple of str
         Those that it deviates by a common factor.
+    common : bool
+        Whether both planes have the same; else one each.
     """
 
     key: str
@@ -46,6 +48,7 @@ class Bias:
     standard_deviation: float
     unit: str
     tables: tuple[str, ...] = ()
+    common: bool = True
 
 
 _SOURCES = {
@@ -70,7 +73,8 @@ def vehicle_biases(file: VehicleFile) -> dict[str, Bias]:
         entry = getattr(file.biases, key)
         if entry is not None:
             file_key, unit, factor = _UNITS[type(entry)]
-            found[source] = Bias(key, source, factor * getattr(entry, file_key), unit, tables)
+            common = isinstance(entry, RelativeBiasEntry) and entry.planes == "common"
+            found[source] = Bias(key, source, factor * getattr(entry, file_key), unit, tables, common)
     return found
 
 

@@ -116,6 +116,9 @@ def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehi
     if file.planes != "yaw" and file.options.mean_response == "nonlinear":
         why = f'is of the yaw plane, and planes = "{file.planes}"; set it to "linear"'
         reader.collector.errors.append(DataError(why, file=toml, column="options.mean_response"))
+    if file.roll_deg is not None and file.planes != BOTH:
+        why = f'turns both planes, and planes = "{file.planes}"; fly "both" or leave it out'
+        reader.collector.errors.append(DataError(why, file=toml, column="roll_deg"))
     for key, asked, why in (
         ("wind.air_speed", file.wind.air_speed != "no_wind", "the wind of the yaw plane blows across the path"),
         ("options.wind_biased_programme", file.options.wind_biased_programme, "the tilt programme is that of pitch"),

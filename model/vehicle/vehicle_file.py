@@ -144,9 +144,10 @@ class NoiseEntry(Section):
 
 
 class RelativeBiasEntry(Section):
-    """A relative error that is constant over a flight."""
+    """A relative error that is constant over a flight, in both planes the same, ``common``, or one of ``each``."""
 
     standard_deviation: Spread
+    planes: Annotated[Literal["common", "each"], STRUCTURE] = "common"
     source: str = ""
 
 
@@ -363,6 +364,7 @@ class VehicleFile(Section):
     default_times: str
     weighting_times_s: tuple[float, ...] = ()
     planes: Annotated[Planes, STRUCTURE] = "yaw"
+    roll_deg: Annotated[float | None, Field(ge=-360, le=360), STRUCTURE] = None
     pitch: PlaneEntry | None = None
     yaw: PlaneEntry | None = None
     reference_area_m2: Positive

@@ -66,7 +66,8 @@ def test_angles_in_the_mean_wind_are_those_of_the_triangle(wind):
         gained = now["axial_acceleration"] - plain.tables["axial_acceleration"].polynomial(time)
         assert gained == pytest.approx(drag * (1 - (air / V) ** 2) / at["mass"], rel=2e-2, abs=1e-4)
         m, air = matrices(study, time), now["relative_velocity"]
-        assert m["G"][row, 0] * wind == pytest.approx(wind * climb / V / air, rel=1e-9)
+        assert m["G"][row, 0] == pytest.approx(climb / air**2, rel=1e-9)
+        assert m["G"][row] @ [wind, 1.0] == pytest.approx(wind * climb / V / air, rel=1e-9)
         wind_state = [k for k, name in enumerate(study.system.state_names) if name.startswith("wind")]
         H = plain.wind.shaping_filter.at(float(plain.tables["altitude"].polynomial(time)))[2]
         np.testing.assert_allclose(m["C"][row, wind_state], climb / air**2 * H, rtol=1e-6)
@@ -169,6 +170,12 @@ def test_the_mean_flies_it_and_nothing_but_the_mean_changes():
 def test_without_wind_nothing_is_biased():
     vehicle = biased(along(in_one("pitch", "zonal"), 0.0))
     assert np.abs(vehicle.tables[PROGRAMME].values).max() < 1e-12
+
+
+@pytest.mark.parametrize("planes", ["yaw", "pitch"])
+def test_roll_is_of_both_planes(planes):
+    with pytest.raises(DataError, match=f'roll_deg.*planes = "{planes}"'):
+        load_vehicle(built_in_vehicles()["as504"], {"planes": planes, "roll_deg": 10.0})
 
 
 @pytest.mark.parametrize("changes", [AIR, BIASED])

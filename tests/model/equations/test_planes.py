@@ -145,3 +145,51 @@ def test_axial_force_belongs_to_no_plane(both):
 def test_one_plane_keeps_its_names():
     plane = flown_planes(in_one("yaw", "zonal"))
     assert [(p.name, p.prefix, p.scope) for p in plane] == [("yaw", "", "")]
+
+
+BIASES = {"biases.thrust.standard_deviation": 0.01, "biases.center_of_pressure.standard_deviation": 0.03}
+
+
+def test_a_bias_is_one_for_both_planes_or_one_each():
+    """One each enters its plane alone, by the column that the common one has there; the sigma stays one parameter."""
+    common = study(in_both(BIASES))
+    each = study(in_both(BIASES | {"biases.center_of_pressure.planes": "each"}))
+    names = [n.name for n in each.system.noises if n.source == "center_of_pressure_bias"]
+    assert names == ["center_of_pressure_bias_pitch", "center_of_pressure_bias_yaw"]
+    assert each.system.parameter_names.count("center_of_pressure_bias.standard_deviation") == 1
+    assert [n.name for n in each.system.noises if n.source == "thrust_bias"] == ["thrust_bias"]
+    one, two = all_matrices(common, 75.0)["A"], all_matrices(each, 75.0)["A"]
+    column = one[:, common.system.state_names.index("deviation_center_of_pressure_bias")]
+    for plane in ("pitch", "yaw"):
+        own = two[:, each.system.state_names.index(f"deviation_center_of_pressure_bias_{plane}")]
+        for i, name in enumerate(each.system.state_names):
+            inside = name.startswith(f"{plane}_")
+            assert own[i] == pytest.approx(column[common.system.state_names.index(name)] if inside else 0.0, rel=1e-12)
+    start = np.asarray(each.system.start_covariance["center_of_pressure_bias"])
+    assert np.trace(start) == 2 and np.count_nonzero(start) == 2
+
+
+def test_a_rolled_vehicle_with_horizontal_wind_is_one_of_another_azimuth():
+    """Closed form: pitch towards yaw by rho is azimuth + rho where the whole wind acts in both planes."""
+    roll = 25.0
+    rolled, plain = study(in_both(HORIZONTAL | {"roll_deg": roll})), study(in_both(HORIZONTAL))
+    turned = plain.with_parameters({"wind.azimuth": plain.parameters["wind.azimuth"].value + np.radians(roll)})
+    found, expected = all_matrices(rolled, 75.0), all_matrices(turned, 75.0)
+    for name in ("A", "C", "E", "G"):
+        np.testing.assert_allclose(found[name], expected[name], rtol=1e-9, atol=1e-12 * np.abs(expected[name]).max())
+    assert rolled.parameters["roll"].value == pytest.approx(np.radians(roll))
+
+
+def test_roll_turns_what_pitch_and_yaw_of_the_flight_meet():
+    """Wind across the path, the flight's own angle and the biased programme, all by one rotation."""
+    options = {"options.trajectory_angle_of_attack": True, "options.wind_biased_programme": True}
+    rolled, plain = study(in_both(options | {"roll_deg": 30.0})), study(in_both(options))
+    c, s = np.cos(np.pi / 6), np.sin(np.pi / 6)
+    for time in TIMES:
+        found, flat = all_matrices(rolled, time), all_matrices(plain, time)
+        for matrix, which in (("G", "angle_of_attack"), ("E", "T1_1"), ("E", "T1_3")):
+            names = plain.system.output_names if matrix == "G" else plain.system.state_names
+            pitch, yaw = (names.index(f"{plane}_{which}") for plane in ("pitch", "yaw"))
+            expected = c * flat[matrix][pitch] + s * flat[matrix][yaw], c * flat[matrix][yaw] - s * flat[matrix][pitch]
+            for row, value in zip((pitch, yaw), expected, strict=True):
+                np.testing.assert_allclose(found[matrix][row], value, rtol=1e-10, atol=1e-15)

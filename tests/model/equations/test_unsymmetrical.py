@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -44,6 +45,65 @@ def unsymmetrical(folder: Path, zero_angle: float = 0.02) -> Path:
     control = text[text.index("[control]") : text.index("[[bending]]")].replace("[control", "[pitch.control")
     toml.write_text(text + SECTION + control.replace("[37.63,", "[30.0,", 1))
     return folder
+
+
+def of_another_shape(folder: Path) -> Path:
+    """Give that vehicle a pitch plane of one mode, without slosh, with loads that are 0.8 times the yaw's."""
+    unsymmetrical(folder)
+    for file, drop in (
+        ("bending_1", "_at_s"),
+        ("loads_station_25m", "slosh|bending_2|p_delta_2"),
+        ("shear_station_25m", "_2"),
+        ("local_loads_station_25m", "_2"),
+    ):
+        lines = [line for line in (folder / f"{file}.csv").read_text().splitlines() if not line.startswith("#")]
+        names = lines[0].split(",")
+        keep = [i for i, c in enumerate(names) if not re.search(drop, c) or "sensor" in c]
+        factor = [1.0 if names[i].startswith("time") or "bending_1" in file else 0.8 for i in keep]
+        body = [names] + [line.split(",") for line in lines[1:]]
+        rows = [[row[i] for i in keep] for row in body]
+        rows[1:] = [[f"{f * float(cell):.12g}" for f, cell in zip(factor, row, strict=True)] for row in rows[1:]]
+        (folder / f"pitch_{file}.csv").write_text("\n".join(",".join(row) for row in rows) + "\n")
+    toml = folder / "vehicle.toml"
+    text = toml.read_text()
+    first = text.index("[[bending]]")
+    mode = text[first : text.index("[[bending]]", first + 1)]
+    loads = text[text.index("[[loads]]") : text.index("# Relative deviations of tables")]
+    axial = loads.index("[loads.axial]")
+    own = (mode + loads[:axial]).replace('file = "', 'file = "pitch_') + loads[axial:]
+    own = own.replace("[[", "[[pitch.").replace("[bending.", "[pitch.bending.").replace("[loads.", "[pitch.loads.")
+    toml.write_text("pitch.slosh = []\n" + text + own)
+    return folder
+
+
+@pytest.mark.filterwarnings("ignore::ascentwind.errors.PlausibilityWarning")
+def test_a_plane_may_have_modes_tanks_and_loads_of_its_own(vehicle_folder):
+    """Fewer states in pitch, whose moment is 0.8 times that of a yaw plane with its numbers, and yaw as it was."""
+    plain = Study.load(vehicle_folder, compile=False, changes={"planes": "yaw"})
+    folder = of_another_shape(vehicle_folder)
+    both = Study.load(folder, compile=False, changes={"planes": "both"})
+    names = both.system.state_names
+    assert [n for n in names if n.startswith("pitch_bending")] == ["pitch_bending_1", "pitch_bending_rate_1"]
+    assert (
+        not any(n.startswith("pitch_slosh") for n in names) and sum(n.startswith("yaw_slosh_rate") for n in names) == 4
+    )
+    assert {"pitch.bending.1.damping", "bending.2.damping"} <= set(both.system.parameter_names)
+    yaw = [i for i, n in enumerate(plain.system.state_names) if not n.startswith(("wind", "deviation"))]
+    same = [names.index(f"yaw_{plain.system.state_names[i]}") for i in yaw]
+    pitch = [i for i, n in enumerate(names) if n.startswith("pitch_")]
+    for time in (30.0, 75.0):
+        found, alone = matrices(both, time), matrices(plain, time)
+        scale = np.abs(alone["A"]).max()
+        expected = alone["A"][np.ix_(yaw, yaw)]
+        np.testing.assert_allclose(found["A"][np.ix_(same, same)], expected, rtol=1e-12, atol=1e-12 * scale)
+        assert not found["A"][np.ix_(pitch, same)].any() and not found["A"][np.ix_(same, pitch)].any()
+        # M'_beta of both planes, by the column of the actuator's first state
+        row, other = (both.system.output_index(f"{plane}_bending_moment") for plane in ("pitch", "yaw"))
+        at = both.tables(time)
+        assert at["pitch.loads.bending_moment.engine_angle"] == pytest.approx(
+            0.8 * at["loads.bending_moment.engine_angle"], rel=1e-9
+        )
+        assert found["C"][row, pitch].any() and not found["C"][row, same].any() and found["C"][other, same].any()
 
 
 def matrices(study: Study, time: float) -> dict[str, np.ndarray]:
@@ -124,6 +184,8 @@ CASES = {
     "pitch wind": ("wind.pitch_wind", "vertical", "normal"),
     "planes": ("planes", "roll", "'yaw', 'pitch' or 'both'"),
     "nonlinear mean": ("options.mean_response", "nonlinear", "mean_response"),
+    "bias of each": ("biases.thrust", {"standard_deviation": 0.01, "planes": "both"}, "'common' or 'each'"),
+    "roll beyond a turn": ("roll_deg", 400.0, "roll_deg"),
     "noise of each": ("noise.thrust.planes", "both", "'common' or 'each'"),
     "one component's filter": ("wind.components.filter", "wind_march_zonal_filter.json", "one component"),
     "one component's table": ("wind.components.statistics.file", "wind_march_zonal.csv", "mean_zonal"),
