@@ -465,4 +465,4 @@ def test_the_command_says_what_it_compared(tmp_path, bar, monkeypatch, capsys):
         main()
     assert not stop.value.code
     printed = capsys.readouterr().out
-    assert "mode 3: 4.846 Hz, forward end at" in printed and "3 files in" in printed
+    assert f"mode 3: {bar.radians[2] / (2 * np.pi):.5g} Hz, forward end at" in printed and "3 files in" in printed
