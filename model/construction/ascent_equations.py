@@ -1,7 +1,7 @@
 """Ascent of a point mass over a rotating oblate Earth, symbolically.
 
-Inertial frame of ``earth``: r' = v, v' = g(r) + [ (T - D) a - N w ] / m, liquid' = -sum of the running groups'
-count x flow x share.
+Inertial frame of ``earth``: r' = v, v' = g(r) + [ (T - D) a - N w ] / m, amount' = -sum of the running groups'
+count x flow x share, for liquid and grains; dropped masses stay until they are taken off.
 
 - a: the vehicle's axis. By the pitch programme cos(chi) up + sin(chi) downrange in the plumbline frame that stops
   turning with the Earth at platform release, or along the velocity relative to the air (gravity turn).
@@ -54,9 +54,10 @@ PITCH_COEFFICIENTS = 5
 class AscentEquations:
     """Functions of (time, state, piece).
 
-    The state is inertial position (m), inertial velocity (m/s) and liquid by tank (kg). The piece is the five
+    The state is inertial position (m), inertial velocity (m/s) and the construction's stores (kg). The piece is five
     coefficients of chi (rad) by rising power of the time since the programme's time base, then for each engine group
-    vacuum thrust (N) and mass flow (kg/s) of one engine as constant and slope over range time; zeros when not running.
+    vacuum thrust (N) and mass flow (kg/s) of one engine as constant and slope over range time; zeros when not running;
+    then for each jettison 1 before it and 0 after.
 
     Attributes
     ----------
@@ -91,11 +92,11 @@ def ascent_equations(construction: Construction, along_velocity: bool = False) -
     along_velocity : bool
         The axis follows the relative velocity instead of the pitch programme.
     """
-    site, tanks = construction.site, [tank.name for tank in construction.tanks]
-    time, state = ca.MX.sym("time"), ca.MX.sym("state", 6 + len(tanks))
-    piece = ca.MX.sym("piece", PITCH_COEFFICIENTS + 4 * len(construction.engines))
-    position, velocity, liquid = state[:3], state[3:6], state[6:]
-    mass = sum(m.mass for m in construction.masses) + ca.sum1(liquid)
+    site, stores = construction.site, construction.stores
+    time, state = ca.MX.sym("time"), ca.MX.sym("state", 6 + len(stores))
+    piece = ca.MX.sym("piece", PITCH_COEFFICIENTS + 4 * len(construction.engines) + len(construction.jettisons))
+    position, velocity, amounts = state[:3], state[3:6], state[6:]
+    mass = sum(m.mass for m in construction.masses if m.name not in stores) + ca.sum1(amounts)
 
     altitude, normal = earth.geodetic(position)
     air = atmosphere(altitude, construction.atmosphere)
@@ -109,20 +110,30 @@ def ascent_equations(construction: Construction, along_velocity: bool = False) -
     axis = relative / speed if along_velocity else ca.cos(chi) * up + ca.sin(chi) * downrange
 
     thrust = control_thrust = ca.MX(0)
-    flow = ca.MX.zeros(len(tanks))
+    flow = ca.MX.zeros(len(stores))
     for i, group in enumerate(construction.engines):
         first = PITCH_COEFFICIENTS + 4 * i
         vacuum, rate = (piece[first + k] + piece[first + k + 1] * time for k in (0, 2))
         running = ca.if_else(vacuum > 0, 1, 0)
         of_group = group.count * (vacuum - running * group.exit_area * air.pressure)
+        of_group = ca.fmax(of_group, 0) if group.solid else of_group
         thrust += of_group
         control_thrust += of_group if group.gimballed else 0
-        shares = ca.DM([group.draws.get(tank, 0.0) for tank in tanks])
+        shares = ca.DM([group.draws.get(store, 0.0) for store in stores])
         flow += group.count * rate * shares
 
     area = construction.reference_area
-    drag = dynamic_pressure * area * _over_mach("drag", construction.drag.mach, construction.drag.coefficient, mach)
+    coefficient = _over_mach("drag", construction.drag.mach, construction.drag.coefficient, mach)
     slope = _over_mach("normal_force", *total_slope(construction), mach)
+    on = ca.vertsplit(piece[PITCH_COEFFICIENTS + 4 * len(construction.engines) :])
+    for jettison, still in zip(construction.jettisons, on, strict=True):
+        if jettison.drag is not None:
+            after = _over_mach("drag_after", jettison.drag.mach, jettison.drag.coefficient, mach)
+            coefficient = still * coefficient + (1 - still) * after
+        for part in construction.normal_force:
+            if part.name in jettison.normal_force:
+                slope -= (1 - still) * _over_mach("dropped", part.mach, part.slope, mach)
+    drag = dynamic_pressure * area * coefficient
     lateral = relative - ca.dot(relative, axis) * axis
     normal_force = -0.5 * air.density * speed * area * slope * lateral
     acceleration = earth.gravity(position) + ((thrust - drag) * axis + normal_force) / mass

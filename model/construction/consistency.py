@@ -9,11 +9,13 @@ import numpy as np
 
 from ..errors import DataError
 from .flight import EngineGroup, NormalForceComponent
+from .grain import Grain
+from .jettison import Jettison
 from .structure import LumpedMass, Stiffness, Tank
 
 
-def refuse_repeated_masses(masses: Sequence[LumpedMass], tanks: Sequence[Tank]) -> None:
-    """Refuse items and tanks that stand twice and would count twice.
+def refuse_repeated_masses(masses: Sequence[LumpedMass], tanks: Sequence[Tank], grains: Sequence[Grain] = ()) -> None:
+    """Refuse items, tanks and grains that stand twice and would count twice.
 
     Raises
     ------
@@ -22,6 +24,12 @@ def refuse_repeated_masses(masses: Sequence[LumpedMass], tanks: Sequence[Tank]) 
     """
     _refuse_twice("masses", "items named", (m.name for m in masses))
     _refuse_twice("tanks", "tanks named", (t.name for t in tanks))
+    _refuse_twice("solid_motors", "motors named", (g.name for g in grains))
+    _refuse_twice(
+        "solid_motors",
+        "tanks, motors or masses named",
+        (p.name for p in (*tanks, *grains, *(masses if grains else ()))),
+    )
     for tank in tanks:
         _refuse_twice(f"tanks.{tank.name}.sections", "sections", tank.sections, "; write it once, with count for more")
     _refuse_same("tanks", {t.name: replace(t, name="") for t in tanks})
@@ -56,6 +64,18 @@ def refuse_repeated_engines(groups: Sequence[EngineGroup]) -> None:
                 "not cut off at one cutoff_s; give each its own cutoff_event",
                 column="engines",
             )
+
+
+def refuse_repeated_jettisons(jettisons: Sequence[Jettison]) -> None:
+    """Refuse events that stand twice, and parts that leave twice.
+
+    Raises
+    ------
+    DataError
+    """
+    _refuse_twice("jettisons", "events named", (j.event for j in jettisons))
+    for kind in ("masses", "motors", "normal_force"):
+        _refuse_twice("jettisons", f"drops of {kind}", (name for j in jettisons for name in getattr(j, kind)))
 
 
 def refuse_repeated_stations(load_stations: Sequence[float], stiffness: Stiffness) -> None:

@@ -10,11 +10,14 @@ from .consistency import (
     refuse_misplaced,
     refuse_repeated_engines,
     refuse_repeated_forces,
+    refuse_repeated_jettisons,
     refuse_repeated_masses,
     refuse_repeated_stations,
 )
 from .flight import AtmosphereFactors, Drag, EngineGroup, NormalForceComponent, PitchProgramme, Site
 from .given_modes import GivenModes
+from .grain import Grain
+from .jettison import Jettison
 from .outline import Outline
 from .structure import LumpedMass, Stiffness, Tank
 from .tank_shape import TankShape
@@ -57,6 +60,9 @@ class Construction:
         None: axial forces are not computed.
     modes : GivenModes or None
         Modes that others computed; None: those of the free beam with ``stiffness``.
+    grains : tuple of Grain
+        Of solid motors; each has an engine group of its name.
+    jettisons : tuple of Jettison
     """
 
     name: str
@@ -80,14 +86,17 @@ class Construction:
     slosh_method: Literal["surface_radius", "cylinder", "potential"] = "surface_radius"
     outline: Outline | None = None
     modes: GivenModes | None = None
+    grains: tuple[Grain, ...] = ()
+    jettisons: tuple[Jettison, ...] = ()
 
     def __post_init__(self):
         places = {"gimbal_station_m": [self.gimbal_station], "sensor_station_m": [self.sensor_station]}
         for component in self.normal_force:
             places[f"normal_force.{component.name}.station_m"] = [float(s) for s in component.station[[0, -1]]]
         refuse_misplaced(self.aft_end, self.forward_end, places)
-        refuse_repeated_masses(self.masses, self.tanks)
+        refuse_repeated_masses(self.masses, self.tanks, self.grains)
         refuse_repeated_engines(self.engines)
+        refuse_repeated_jettisons(self.jettisons)
         refuse_repeated_forces(self.normal_force)
         refuse_repeated_stations(self.load_stations, self.stiffness)
         for mass in self.masses:
@@ -107,7 +116,20 @@ class Construction:
                 f"stiffness is given from {ends[0]:g} to {ends[1]:g} m, the vehicle reaches from {self.aft_end:g} to "
                 f"{self.forward_end:g} m; add stations"
             )
-        names = [tank.name for tank in self.tanks]
+        slack = 1e-6 * (self.forward_end - self.aft_end)
+        for grain in self.grains:
+            if grain.begin < self.aft_end - slack or grain.end > self.forward_end + slack:
+                raise DataError(f"grain '{grain.name}' lies beyond the vehicle's ends; correct its stations")
+        for jettison in self.jettisons:
+            jettison.require_known(
+                [m.name for m in self.masses], [g.name for g in self.grains], [c.name for c in self.normal_force]
+            )
+            if not self.site.release < jettison.time < self.end_time:
+                raise DataError(
+                    f"jettison '{jettison.event}' at {jettison.time:g} s does not lie between release and end_time_s, "
+                    f"{self.site.release:g} and {self.end_time:g} s; correct time_s"
+                )
+        names = [*(tank.name for tank in self.tanks), *(grain.name for grain in self.grains)]
         for group in self.engines:
             for tank in (*group.draws, *group.residual):
                 if tank not in names:
@@ -128,6 +150,16 @@ class Construction:
             self._check_modes(self.modes)
         if not self.engines:
             raise DataError("the vehicle has no engines; add [[engines]]")
+
+    @property
+    def stores(self) -> dict[str, float]:
+        """What changes in flight, by name, and what is there of it at release (kg): liquid, grains, dropped items."""
+        dropped = {name for jettison in self.jettisons for name in jettison.masses}
+        return {
+            **{tank.name: tank.liquid for tank in self.tanks},
+            **{grain.name: grain.propellant for grain in self.grains},
+            **{item.name: item.mass for item in self.masses if item.name in dropped},
+        }
 
     def _check_modes(self, modes: GivenModes) -> None:
         count = modes.frequency.shape[1]

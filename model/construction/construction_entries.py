@@ -63,6 +63,41 @@ class EngineEntry(Section):
     source: str
 
 
+class GrainEntry(Section):
+    begin_m: float
+    end_m: float
+    radius_m: Positive
+    density_kg_m3: Positive
+    distance_m: NotNegative = 0.0
+
+
+class SolidMotorEntry(Section):
+    """Motors that burn alike; propellant and ``file`` are of one of them."""
+
+    name: Name
+    count: Annotated[Whole, Field(ge=1)]
+    gimballed: bool
+    exit_area_m2: NotNegative
+    file: FileName
+    grain: GrainEntry
+    propellant_kg: Positive
+    sliver_kg: NotNegative = 0.0
+    burnout_event: Name
+    status: Status
+    source: str
+
+
+class JettisonEntry(Section):
+    event: Name
+    time_s: float
+    masses: tuple[str, ...] = ()
+    motors: tuple[str, ...] = ()
+    normal_force: tuple[str, ...] = ()
+    drag_file: FileName | None = None
+    status: Status
+    source: str
+
+
 class NormalForceEntry(Section):
     """A part of the normal force; its slope over Mach number is the column of its name in ``file``."""
 
@@ -129,5 +164,7 @@ class ConstructionFile(Section):
     pitch: PitchEntry
     site: SiteEntry
     tanks: tuple[TankEntry, ...] = ()
-    engines: Annotated[tuple[EngineEntry, ...], Field(min_length=1)]
+    engines: tuple[EngineEntry, ...] = ()
+    solid_motors: tuple[SolidMotorEntry, ...] = ()
+    jettisons: tuple[JettisonEntry, ...] = ()
     normal_force: Annotated[tuple[NormalForceEntry, ...], Field(min_length=1)]

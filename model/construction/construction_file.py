@@ -19,20 +19,25 @@ from .construction import Construction
 from .construction_entries import (
     ConstructionFile,
     EngineEntry,
+    JettisonEntry,
     NormalForceEntry,
     PitchEntry,
     SiteEntry,
+    SolidMotorEntry,
     Status,
     TankEntry,
 )
 from .flight import AtmosphereFactors, Drag, EngineGroup, NormalForceComponent, PitchProgramme, Site
 from .given_modes import GivenModes
+from .grain import Grain
+from .jettison import Jettison
 from .outline import Outline
 from .sizes import check_sizes
 from .structure import LumpedMass, Stiffness, Tank, TankSection
 
 CONSTRUCTION_FILE = "construction.toml"
 LONGEST_BRIDGE = 0.08  # of the vehicle's length, from one item of the stiffness to another
+FLOW_ERROR = 0.01  # of the propellant of a solid motor, by which its table may burn another amount
 _ORIGIN = ("status", "source")
 _POLYNOMIAL = (
     ("begin", "s"),
@@ -71,6 +76,8 @@ def load_construction(folder: Path, changes: Mapping[str, Any] | None = None) ->
     outline = None if entry.outline is None else _outline(file_inside(folder, entry.outline.file))
     atmosphere = None if entry.atmosphere is None else _atmosphere(file_inside(folder, entry.atmosphere.file))
     engines = tuple(_engine(folder, e) for e in entry.engines)
+    motors = tuple(_solid_motor(folder, e, entry.site.release_s) for e in entry.solid_motors)
+    jettisons = tuple(_jettison(folder, e) for e in entry.jettisons)
     normal_force = tuple(_normal_force(folder, e) for e in entry.normal_force)
     _refuse_unused_parts(folder, entry.normal_force)
     with _located(toml):
@@ -93,7 +100,7 @@ def load_construction(folder: Path, changes: Mapping[str, Any] | None = None) ->
             bending_modes=entry.bending_modes,
             normal_force=normal_force,
             drag=drag,
-            engines=engines,
+            engines=(*engines, *(group for group, _ in motors)),
             pitch=pitch,
             site=_site(entry.site),
             atmosphere=atmosphere,
@@ -102,6 +109,8 @@ def load_construction(folder: Path, changes: Mapping[str, Any] | None = None) ->
             slosh_method=entry.slosh_method,
             outline=outline,
             modes=modes,
+            grains=tuple(grain for _, grain in motors),
+            jettisons=jettisons,
         )
     check_sizes(construction, toml)
     return construction
@@ -112,7 +121,8 @@ def construction_files(folder: Path) -> tuple[Path, ...]:
     toml = file_inside(folder, CONSTRUCTION_FILE)
     entry = read_toml(toml, ConstructionFile)
     parts = (entry.masses, entry.stiffness, entry.modes, entry.drag, entry.outline, entry.atmosphere, entry.pitch)
-    names = [p.file for p in (*parts, *entry.engines, *entry.normal_force) if p is not None]
+    names = [p.file for p in (*parts, *entry.engines, *entry.normal_force, *entry.solid_motors) if p is not None]
+    names += [jettison.drag_file for jettison in entry.jettisons if jettison.drag_file is not None]
     return (toml, *(file_inside(folder, name) for name in dict.fromkeys(names)))
 
 
@@ -281,6 +291,65 @@ def _engine(folder: Path, entry: EngineEntry) -> EngineGroup:
             cutoff_event=entry.cutoff_event,
             residual=entry.residual_kg,
         )
+
+
+def _solid_motor(folder: Path, entry: SolidMotorEntry, release: float) -> tuple[EngineGroup, Grain]:
+    """Read a motor; its flow is scaled, within ``FLOW_ERROR``, so that it burns what is in the grain."""
+    toml, column = folder / CONSTRUCTION_FILE, f"solid_motors.{entry.name}"
+    table = _read(file_inside(folder, entry.file), "time", "s")
+    time, thrust, flow = table.columns["time"], table.column("vacuum_thrust", "N"), table.column("mass_flow", "kg/s")
+    for name in ("vacuum_thrust", "mass_flow"):
+        table.require_positive(name, allow_zero=True)
+    if time[0] > release and (thrust[0] > 0 or flow[0] > 0):
+        raise DataError(
+            f"begins with {thrust[0]:g} N and {flow[0]:g} kg/s at {time[0]:g} s, after release at {release:g} s; begin "
+            "with a row of zeros",
+            file=table.file,
+            row=table.lines[0],
+        )
+    moments = np.unique([max(time[0], release), *time[time > release]])
+    burnt = float(np.trapezoid(np.interp(moments, time, flow), moments))
+    burns = entry.propellant_kg - entry.sliver_kg
+    if abs(burnt - burns) > FLOW_ERROR * burns:
+        raise DataError(
+            f"burns {burnt:.6g} kg from {moments[0]:g} to {moments[-1]:g} s, but propellant_kg less sliver_kg of one "
+            f"motor is {burns:.6g}; make them agree within {100 * FLOW_ERROR:g} %",
+            file=table.file,
+            column="mass_flow",
+        )
+    grain = entry.grain
+    with _located(toml, column):
+        return (
+            EngineGroup(
+                name=entry.name,
+                count=entry.count,
+                gimballed=entry.gimballed,
+                exit_area=entry.exit_area_m2,
+                time=time,
+                vacuum_thrust=thrust,
+                mass_flow=flow * burns / burnt,
+                draws={entry.name: 1.0},
+                cutoff=float(time[-1]),
+                cutoff_event=entry.burnout_event,
+                solid=True,
+            ),
+            Grain(
+                name=entry.name,
+                count=entry.count,
+                begin=grain.begin_m,
+                end=grain.end_m,
+                radius=grain.radius_m,
+                distance=grain.distance_m,
+                density=grain.density_kg_m3,
+                propellant=entry.count * entry.propellant_kg,
+            ),
+        )
+
+
+def _jettison(folder: Path, entry: JettisonEntry) -> Jettison:
+    drag = None if entry.drag_file is None else _drag(file_inside(folder, entry.drag_file))
+    with _located(folder / CONSTRUCTION_FILE, f"jettisons.{entry.event}"):
+        return Jettison(entry.event, entry.time_s, entry.masses, entry.motors, entry.normal_force, drag)
 
 
 def _normal_force(folder: Path, entry: NormalForceEntry) -> NormalForceComponent:

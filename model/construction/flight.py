@@ -36,6 +36,9 @@ class EngineGroup:
         Name of that event in the vehicle's [events], such as 'center_engine_cutoff'.
     residual : mapping
         Tank name to the liquid (kg) that is left at depletion.
+    solid : bool
+        A motor that burns by its table alone: nothing before the first row, tail-off to nothing in the last, thrust
+        never below zero.
     """
 
     name: str
@@ -49,11 +52,16 @@ class EngineGroup:
     cutoff: float | None
     cutoff_event: str
     residual: Mapping[str, float] = field(default_factory=dict)
+    solid: bool = False
 
     def __post_init__(self):
         if self.count < 1 or not self.exit_area >= 0:
             raise DataError(f"engine group '{self.name}' needs a count of 1 or more and an exit area of 0 or more")
-        if not (self.vacuum_thrust > 0).all() or not (self.mass_flow > 0).all():
+        if self.solid:
+            for values, what in ((self.vacuum_thrust, "thrust"), (self.mass_flow, "mass flow")):
+                if not (values >= 0).all() or not (values[:-1] > 0).any():
+                    raise DataError(f"solid motor '{self.name}' needs {what} of 0 or more, and some above")
+        elif not (self.vacuum_thrust > 0).all() or not (self.mass_flow > 0).all():
             raise DataError(f"engine group '{self.name}' needs positive thrust and mass flow in every row")
         if any(share <= 0 for share in self.draws.values()) or sum(self.draws.values()) > 1 + 1e-9:
             raise DataError(f"engine group '{self.name}' needs positive draws with a sum of at most 1")

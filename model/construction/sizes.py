@@ -45,7 +45,10 @@ def _sizes(construction: Construction) -> Iterator[tuple[str, str, bool]]:
             yield column, why, not refused[0] <= x <= refused[1]
 
     for group in construction.engines:
-        impulse = group.vacuum_thrust / (GRAVITY * group.mass_flow)
+        burning = (group.vacuum_thrust > 0) & (group.mass_flow > 0)
+        impulse = np.where(burning, group.vacuum_thrust, 300.0) / (
+            GRAVITY * np.where(burning, group.mass_flow, 1 / GRAVITY)
+        )
         k = int(np.argmax(np.abs(np.log(impulse / 300))))
         yield from beyond(
             f"engines.{group.name}.file", float(impulse[k]), (180, 500), (30, 2000),
@@ -56,6 +59,7 @@ def _sizes(construction: Construction) -> Iterator[tuple[str, str, bool]]:
         g.count * float(np.interp(construction.site.release, g.time, g.vacuum_thrust)) for g in construction.engines
     )
     mass = sum(m.mass for m in construction.masses) + sum(t.liquid for t in construction.tanks)
+    mass += sum(g.propellant for g in construction.grains)
     yield from beyond(
         "engines", thrust / (GRAVITY * mass), (1.0, 6.0), (0.5, 60.0),
         f"make {thrust:.4g} N in vacuum at release, {thrust / (GRAVITY * mass):.3g} times the weight of {mass:.4g} kg; "
@@ -148,7 +152,7 @@ def _gaps(construction: Construction) -> Iterator[tuple[str, str, bool]]:
     """Stretches of the vehicle without any mass."""
     aft, forward = construction.aft_end, construction.forward_end
     reached = aft
-    for mass in sorted(construction.masses, key=lambda m: m.begin):
+    for mass in sorted((*construction.masses, *construction.grains), key=lambda m: m.begin):
         yield from _gap(reached, mass.begin, forward - aft)
         reached = max(reached, mass.end)
     yield from _gap(reached, forward, forward - aft)
@@ -174,7 +178,7 @@ def _propellants(construction: Construction) -> Iterator[tuple[str, str, bool]]:
     """Tanks run dry together, and engines draw all that they burn from them."""
     flow = dict.fromkeys((t.name for t in construction.tanks), 0.0)
     residual = dict(flow)
-    for group in construction.engines:
+    for group in (g for g in construction.engines if not g.solid):
         drawn = sum(group.draws.values())
         if group.draws and drawn < 0.95:
             why = f"take {drawn:.3g} of the flow from tanks, the rest from nowhere; shares of all propellants make 1"

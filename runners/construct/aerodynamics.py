@@ -64,18 +64,26 @@ def local_normal_force(construction: Construction, mach: ArrayLike, edges: Array
     return component_slopes(construction, mach).T @ shares
 
 
-def intensity(construction: Construction, mach: ArrayLike, x: ArrayLike) -> NDArray[np.float64]:
-    """Return the local normal-force slope c'_N, 1/(rad m), at points ``x`` (m forward of the gimbal plane): (n, m)."""
+def intensity(
+    construction: Construction, mach: ArrayLike, x: ArrayLike, time: ArrayLike | None = None
+) -> NDArray[np.float64]:
+    """Return the local normal-force slope c'_N, 1/(rad m), at points ``x`` (m forward of the gimbal plane): (n, m).
+
+    With flight times (n,) of the Mach numbers, parts that are dropped count as long as they are there.
+    """
     stations = np.asarray(x, float) + construction.gimbal_station
     shapes = []
     for component in construction.normal_force:
         inside = np.interp(stations, component.station, component.shape, left=0.0, right=0.0)
         shapes.append(inside / np.trapezoid(component.shape, component.station))
-    return component_slopes(construction, mach).T @ np.array(shapes)
+    return component_slopes(construction, mach, time).T @ np.array(shapes)
 
 
 def component_slopes(construction: Construction, mach: ArrayLike, time: ArrayLike | None = None) -> NDArray[np.float64]:
-    """Return the slope of every component at the Mach numbers, (components, n), 1/rad."""
+    """Return the slope of every component at the Mach numbers, (components, n), 1/rad.
+
+    With flight times, it is zero where a component was dropped.
+    """
     mach = np.atleast_1d(np.asarray(mach, float))
     if not construction.normal_force:
         raise DataError("the vehicle has no normal force; add [[normal_force]] to its construction")
@@ -89,7 +97,11 @@ def component_slopes(construction: Construction, mach: ArrayLike, time: ArrayLik
                 f"{low if mach[at] < low else high:g}; extend its table",
                 time=None if time is None else float(np.atleast_1d(time)[at]),
             )
-    return np.array([np.interp(mach, c.mach, c.slope) for c in construction.normal_force])
+    slopes = np.array([np.interp(mach, c.mach, c.slope) for c in construction.normal_force])
+    for jettison in construction.jettisons if time is not None else ():
+        gone = [c.name in jettison.normal_force for c in construction.normal_force]
+        slopes[np.ix_(gone, np.atleast_1d(time) > jettison.time)] = 0.0
+    return slopes
 
 
 def knots(construction: Construction) -> NDArray[np.float64]:

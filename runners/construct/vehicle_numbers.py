@@ -111,17 +111,17 @@ def compute_vehicle(
     done(STEPS[4])
     stations = along_stations(construction)
     line = Line.cut_at(modes.x, aerodynamics.knots(construction), stations)
-    intensity = aerodynamics.intensity(construction, flight.mach, line.points)
+    intensity = aerodynamics.intensity(construction, flight.mach, line.points, flight.time)
     displacement, rotation = (line.linear(modes.x, shape) for shape in (modes.displacement, modes.rotation))
     mass = line.spread(modes.x, mass_line(construction, modes.x, flight.liquid))
-    rotary = line.spread(modes.x, rotary_line(construction, modes.x))
-    at_stations = aerodynamics.intensity(construction, flight.mach, stations + JUST_FORWARD)
+    rotary = np.broadcast_to(line.spread(modes.x, rotary_line(construction, modes.x, flight.liquid)), mass.shape)
+    at_stations = aerodynamics.intensity(construction, flight.mach, stations + JUST_FORWARD, flight.time)
     force = flight.dynamic_pressure * construction.reference_area
     loaded = [
         LoadedVehicle(
             line=line,
             mass=mass[row],
-            rotary_inertia=rotary,
+            rotary_inertia=rotary[row],
             normal_force=force[row] * intensity[row],
             normal_force_at_stations=force[row] * at_stations[row],
             control_thrust=float(flight.control_thrust[row]),

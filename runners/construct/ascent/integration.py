@@ -40,8 +40,9 @@ class Ascent:
         self.construction = construction
         kinds = (False, True) if construction.pitch.kind == "gravity_turn" else (False,)
         self._equations = {kind: ascent_equations(construction, kind) for kind in kinds}
-        liquid = max([1.0, *(tank.liquid for tank in construction.tanks)])
-        self._scale = np.concatenate([np.full(3, 1e6), np.full(3, 1e3), np.full(len(construction.tanks), liquid)])
+        stores = construction.stores
+        largest = max([1.0, *stores.values()])
+        self._scale = np.concatenate([np.full(3, 1e6), np.full(3, 1e3), np.full(len(stores), largest)])
         self._integrators = {kind: _integrator(e, self._scale) for kind, e in self._equations.items()}
 
     def at_release(self) -> Array:
@@ -51,7 +52,7 @@ class Ascent:
         turn = ca.evalf(earth.rotation_about_pole(angle)).full()
         position = turn @ earth.site_position(site.latitude, site.altitude)
         velocity = np.cross([0.0, 0.0, earth.ROTATION_RATE], position)
-        return np.concatenate([position, velocity, [tank.liquid for tank in self.construction.tanks]])
+        return np.concatenate([position, velocity, list(self.construction.stores.values())])
 
     def leg(self, running: Iterable[str], begin: float, end: float, start: Array) -> Leg:
         """Integrate between two times without an edge inside.
@@ -72,11 +73,11 @@ class Ascent:
         return self._integrate(leg.along_velocity, leg.piece, leg.begin, time, leg.start)
 
     def observe(self, leg: Leg, time: float) -> dict[str, float]:
-        """Return the quantities named in ``OBSERVED`` and the liquid by tank at a time of a leg."""
+        """Return the quantities named in ``OBSERVED`` and the stores' amounts (kg) at a time of a leg."""
         state = self.state(leg, time)
         values = self._equations[leg.along_velocity].observe(time, state, leg.piece).full().ravel()
-        liquids = {f"liquid.{t.name}": m for t, m in zip(self.construction.tanks, state[6:], strict=True)}
-        return dict(zip(OBSERVED, values.tolist(), strict=True)) | liquids
+        amounts = {f"liquid.{name}": m for name, m in zip(self.construction.stores, state[6:], strict=True)}
+        return dict(zip(OBSERVED, values.tolist(), strict=True)) | amounts
 
     def locate(self, leg: Leg, value: Callable[[Mapping[str, float]], float]) -> float | None:
         """Return the time of a leg at which a quantity passes through zero, or None if its sign stays."""

@@ -30,7 +30,7 @@ def first_depletion(ascent: Ascent, leg: Leg, running: Iterable[EngineGroup]) ->
         A tank is empty while engines that draw from it still run by command.
     """
     found = []
-    for group in running:
+    for group in (g for g in running if not g.solid):  # a solid motor's flow is that of its grain
         for tank in group.draws:
             left = group.residual.get(tank, 0.0)
             time = ascent.locate(leg, lambda o, tank=tank, left=left: o[f"liquid.{tank}"] - left)
@@ -66,6 +66,8 @@ def check_held(group: EngineGroup, begin: float, end: float) -> None:
     ------
     DataError
     """
+    if group.solid:
+        return
     first, last = float(group.time[0]), float(group.time[-1])
     before, after = max(first - begin, 0.0), max(end - last, 0.0)
     share = (before + after) / (end - begin)

@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....model.construction import Construction
+from ....model.construction.jettison import Jettison
+from ....model.errors import DataError
 from .integration import Ascent, Leg
 from .limits import check_held, check_leg, check_lift_off, first_depletion
 from .pieces import piece_edges
@@ -23,7 +25,8 @@ _LONGEST_LEG = 1.0  # s
 class MeanFlight:
     """Flight of the point mass without wind, by rows of time.
 
-    Rows stand at multiples of the spacing after release, and 0.1 ms either side of every cutoff, where thrust jumps.
+    Rows stand at multiples of the spacing after release, and 0.1 ms either side of every cutoff and jettison, where
+    thrust or masses jump.
 
     Attributes
     ----------
@@ -56,13 +59,13 @@ class MeanFlight:
     surface_range : (n,) array
         From the site over the turning Earth (m).
     liquid : mapping of str to (n,) array
-        By tank (kg).
+        By tank, grain of a solid motor and mass that is dropped (kg).
     events : mapping of str to float
         'release', 'mach_one', 'max_dynamic_pressure', 'tilt_arrest' (of a gravity turn: 'gravity_turn') and the engine
-        groups' cutoff events, as far as the flight reaches them (s).
+        groups' cutoff events and the jettisons, as far as the flight reaches them (s).
     at_events : mapping of str to mapping of str to float
-        At each of them ``mach``, ``relative_velocity``, ``altitude``, ``dynamic_pressure`` and ``mass``; at a cutoff
-        just before it.
+        At each of them ``mach``, ``relative_velocity``, ``altitude``, ``dynamic_pressure`` and ``mass``; at a cutoff or
+        jettison just before it.
     """
 
     time: Array
@@ -117,14 +120,16 @@ def fly(construction: Construction, spacing: float = 1.0) -> MeanFlight:
         check_held(group, release, stops.get(group.name, end))
     events = {"release": release, **_programme_events(construction, end), **_found_events(ascent, legs)}
     events.update((group.cutoff_event, time) for group, time in cut)
-    jumps = [time for _, time in cut]
+    dropped = {j.event: j.time for j in construction.jettisons}
+    events.update(dropped)
+    jumps = sorted({*(time for _, time in cut), *dropped.values()})
     rows = _row_times(grid, jumps, release, end)
     observed = [ascent.observe(_leg_of(legs, t), t) for t in rows]
     names = [name for name in observed[0] if name in MeanFlight.__dataclass_fields__]
     return MeanFlight(
         time=rows,
         **{name: np.array([o[name] for o in observed]) for name in names},
-        liquid={t.name: np.array([o[f"liquid.{t.name}"] for o in observed]) for t in construction.tanks},
+        liquid={name: np.array([o[f"liquid.{name}"] for o in observed]) for name in construction.stores},
         events=events,
         at_events={name: _at_event(ascent, legs, time) for name, time in events.items()},
     )
@@ -159,7 +164,23 @@ def _legs(ascent: Ascent, edges: Sequence[float]) -> tuple[list[Leg], list[tuple
         commanded = [g for g in running if g.cutoff is not None and g.cutoff <= now]
         cut += [(g, g.cutoff) for g in commanded]
         running = [g for g in running if g not in commanded]
+        for jettison in (j for j in construction.jettisons if j.time == now):
+            state = _without(construction, state, jettison)
+            running = [g for g in running if g.name not in jettison.motors]
+    late = [j for j in construction.jettisons if j.time > now]
+    if late:
+        raise DataError(
+            f"jettison '{late[0].event}' at {late[0].time:g} s comes after the last engines stop at {now:g} s; drop it "
+            "earlier, or leave it out",
+            time=late[0].time,
+        )
     return legs, cut
+
+
+def _without(construction: Construction, state: Array, jettison: Jettison) -> Array:
+    """Return the state without what a jettison drops."""
+    kept = [name not in (*jettison.masses, *jettison.motors) for name in construction.stores]
+    return np.concatenate([state[:6], np.where(kept, state[6:], 0.0)])
 
 
 def _row_times(grid: Array, jumps: Iterable[float], begin: float, end: float) -> Array:

@@ -23,6 +23,7 @@ def piece_edges(construction: Construction) -> set[float]:
     edges = {pitch.time_base + tau for tau in of_programme}
     for group in construction.engines:
         edges.update(group.time.tolist())
+    edges.update(jettison.time for jettison in construction.jettisons)
     return edges
 
 
@@ -36,6 +37,7 @@ def piece(construction: Construction, running: Iterable[str], begin: float, end:
             parts += [_line(group, group.vacuum_thrust, middle), _line(group, group.mass_flow, middle)]
         else:
             parts.append(np.zeros(4))
+    parts.append(np.array([float(middle < jettison.time) for jettison in construction.jettisons]))
     return np.concatenate(parts)
 
 
@@ -68,8 +70,13 @@ def pitch_polynomial(pitch: PitchProgramme, tau: float) -> Array:
 
 
 def _line(group: EngineGroup, values: Array, at: float) -> Array:
-    """Return constant and slope over range time of an engine table about a time; held outside its rows."""
+    """Return constant and slope over range time of an engine table about a time.
+
+    Outside its rows it is held, and of a solid motor zero.
+    """
     if not group.time[0] < at < group.time[-1]:
+        if group.solid:
+            return np.zeros(2)
         return np.array([np.interp(at, group.time, values), 0.0])
     return _through(group.time, values, at)
 

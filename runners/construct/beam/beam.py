@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -68,12 +68,16 @@ class FreeBeam:
 
     @classmethod
     def of(cls, construction: Construction, edges: ArrayLike) -> FreeBeam:
-        """Assemble the beam between edges (n,), metres forward of the gimbal plane."""
+        """Assemble the beam between edges (n,), metres forward of the gimbal plane, with all that turns at release."""
         x = np.asarray(edges, dtype=float)
         elements = element_flexibilities(construction.stiffness, x + construction.gimbal_station)
         turn = static_rotations(elements, x)
-        rotary = turn.T @ line_matrix(rotary_line(construction, x)) @ turn
-        return cls(x, cantilever_flexibility(elements, x), turn, 0.5 * (rotary + rotary.T), construction.gimbal_station)
+        rotary = _rotary(turn, rotary_line(construction, x))
+        return cls(x, cantilever_flexibility(elements, x), turn, rotary, construction.gimbal_station)
+
+    def with_rotary(self, line: NDArray[np.float64]) -> FreeBeam:
+        """Return the beam with another rotary inertia of the sections in each element (n - 1,), kg m2."""
+        return replace(self, rotary=_rotary(self.turn, line))
 
     def product(
         self, element_masses: NDArray[np.float64], first: NDArray[np.float64], second: NDArray[np.float64]
@@ -146,6 +150,11 @@ def beam_modes(
     """
     beam = FreeBeam.of(construction, edges)
     return beam.scaled(*beam.eigenmodes(np.asarray(element_masses, dtype=float), count), time)
+
+
+def _rotary(turn: NDArray[np.float64], line: NDArray[np.float64]) -> NDArray[np.float64]:
+    rotary = turn.T @ line_matrix(line) @ turn
+    return 0.5 * (rotary + rotary.T)
 
 
 def line_matrix(masses: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -61,9 +61,9 @@ def given_modes(construction: Construction, time: ArrayLike, liquid: Mapping[str
     stations = np.clip(nodes + construction.gimbal_station, modes.station[0], modes.station[-1])
     shapes = CubicSpline(modes.station, modes.displacement, axis=-1)(stations)
     turns = CubicSpline(modes.station, modes.rotation, axis=-1)(stations)
-    rotary = line_matrix(rotary_line(construction, nodes))
     amounts = {name: np.broadcast_to(np.asarray(v, dtype=float), times.shape) for name, v in liquid.items()}
     lines = mass_line(construction, nodes, amounts)
+    rotary = np.broadcast_to(rotary_line(construction, nodes, amounts), lines.shape)
     with threadpool_limits(1, user_api="blas"):
         _check(construction, modes, nodes, times, lines, shapes, turns, rotary)
         made = _at_rows(modes, nodes, times, lines, shapes, turns, rotary)
@@ -83,10 +83,11 @@ def _at_rows(
 
     frequency, mass, Y, R = (over_time(v) for v in (modes.frequency, modes.generalized_mass, shapes, turns))
     for row, line in enumerate(lines):
+        J = line_matrix(rotary[row])
         rigid, turned = np.vstack([np.ones(nodes.size), nodes]), np.vstack([np.zeros(nodes.size), np.ones(nodes.size)])
         M = line_matrix(line)
-        own = rigid @ M @ rigid.T + turned @ rotary @ turned.T
-        share = np.linalg.solve(own, rigid @ M @ Y[row].T + turned @ rotary @ R[row].T)
+        own = rigid @ M @ rigid.T + turned @ J @ turned.T
+        share = np.linalg.solve(own, rigid @ M @ Y[row].T + turned @ J @ R[row].T)
         Y[row] -= share.T @ rigid
         R[row] -= share.T @ turned
     end = Y[..., -1]
@@ -108,15 +109,15 @@ def _check(
     for t, now in enumerate(modes.time):
         if not times[0] <= now <= times[-1]:
             continue
-        line = np.array([np.interp(now, times, column) for column in lines.T])
-        M = line_matrix(line)
-        gram = shapes[t] @ M @ shapes[t].T + turns[t] @ rotary @ turns[t].T
+        line, turning = (np.array([np.interp(now, times, column) for column in of.T]) for of in (lines, rotary))
+        M, J = line_matrix(line), line_matrix(turning)
+        gram = shapes[t] @ M @ shapes[t].T + turns[t] @ J @ turns[t].T
         center = float(np.ones(nodes.size) @ M @ nodes) / line.sum()
         rigid = np.vstack([np.ones(nodes.size), nodes - center])
         turned = np.vstack([np.zeros(nodes.size), np.ones(nodes.size)])
-        size = np.sqrt(np.diag(rigid @ M @ rigid.T + turned @ rotary @ turned.T))
+        size = np.sqrt(np.diag(rigid @ M @ rigid.T + turned @ J @ turned.T))
         own = np.sqrt(np.diag(gram))
-        left = np.abs(rigid @ M @ shapes[t].T + turned @ rotary @ turns[t].T) / size[:, None] / own
+        left = np.abs(rigid @ M @ shapes[t].T + turned @ J @ turns[t].T) / size[:, None] / own
         _refuse_others(modes, float(now), t, gram, left)
         if before is not None:
             likeness = np.diag(shapes[t] @ M @ before.T) ** 2 / np.diag(shapes[t] @ M @ shapes[t].T)

@@ -13,7 +13,7 @@ from threadpoolctl import threadpool_limits
 
 from ....model.construction import Construction
 from ....model.errors import ModeError
-from ..mass.line import beam_edges, mass_line
+from ..mass.line import beam_edges, mass_line, rotary_line
 from .beam import FreeBeam
 
 _SPARE_MODES = 3  # beyond those asked for: one of them may cross into the range
@@ -82,13 +82,17 @@ def followed_modes(
     times = np.asarray(time, dtype=float)
     amounts = {name: np.broadcast_to(np.asarray(v, dtype=float), times.shape) for name, v in liquid.items()}
     nodes = beam_edges(construction) if edges is None else np.asarray(edges, dtype=float)
-    beam = FreeBeam.of(construction, nodes)
+    whole = FreeBeam.of(construction, nodes)
 
-    def masses_at(now: float) -> NDArray[np.float64]:
-        return mass_line(construction, nodes, {name: float(np.interp(now, times, v)) for name, v in amounts.items()})
+    def at(now: float) -> tuple[FreeBeam, NDArray[np.float64]]:
+        there = {name: float(np.interp(now, times, v)) for name, v in amounts.items()}
+        masses = mass_line(construction, nodes, there)
+        if not construction.grains and not construction.jettisons:
+            return whole, masses
+        return whole.with_rotary(rotary_line(construction, nodes, there)), masses
 
     def follow(shapes: NDArray[np.float64], before: float, now: float, halvings: int) -> _Step:
-        masses = masses_at(now)
+        beam, masses = at(now)
         frequency, candidates = beam.eigenmodes(masses, count + _SPARE_MODES)
         own = np.diag(beam.product(masses, shapes, shapes))
         alike = beam.product(masses, shapes, candidates) ** 2 / own[:, None]
@@ -107,12 +111,13 @@ def followed_modes(
         return frequency, candidates, np.minimum(first, second)
 
     with threadpool_limits(1, user_api="blas"):  # the matrices are small: on two threads they take ten times as long
-        step: _Step = (*beam.eigenmodes(masses_at(float(times[0])), count), np.ones(count))
+        beam, masses = at(float(times[0]))
+        step: _Step = (*beam.eigenmodes(masses, count), np.ones(count))
         steps = [step]
         for before, now in pairwise(times):
             step = follow(step[1], float(before), float(now), _HALVINGS)
             steps.append(step)
-    modes = [beam.scaled(frequency, shapes, float(t)) for t, (frequency, shapes, _) in zip(times, steps, strict=True)]
+    modes = [whole.scaled(frequency, shapes, float(t)) for t, (frequency, shapes, _) in zip(times, steps, strict=True)]
     return ModeHistory(
         time=times,
         frequency=np.array([m.frequency for m in modes]),

@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ....model.construction import Construction
-from ....model.construction.structure import LumpedMass
 from ....model.construction.tank_shape import TankShape
-from .properties import require_known_tanks
+from .properties import require_known_stores
 
 LONGEST_ELEMENT_SHARE = 1 / 160
 
@@ -49,8 +48,8 @@ def mass_line(construction: Construction, edges: ArrayLike, liquid: Mapping[str,
     edges : (n + 1,) array
         Metres forward of the gimbal plane, from the aft to the forward end of the vehicle.
     liquid : mapping
-        Tank name to the liquid in it (kg), each a number or of shape (...); a tank that is left out holds what it
-        holds at release.
+        Tank, grain or dropped item to what is there of it (kg), each a number or of shape (...); what is left out is
+        there as at release.
 
     Raises
     ------
@@ -59,11 +58,13 @@ def mass_line(construction: Construction, edges: ArrayLike, liquid: Mapping[str,
     DataError
         More liquid than the tank holds.
     """
-    require_known_tanks(construction, liquid)
+    require_known_stores(construction, liquid)
     station = _stations(construction, edges)
     below = np.zeros(station.size)
     for item in construction.masses:
-        below += item.mass * _share_below(item, station)
+        below = below + _amount(liquid, item.name, item.mass) * _share_below(item.begin, item.end, station)
+    for grain in construction.grains:
+        below = below + _amount(liquid, grain.name, grain.propellant) * _share_below(grain.begin, grain.end, station)
     for tank in construction.tanks:
         shape = TankShape.of(tank)
         level = shape.level(np.asarray(liquid.get(tank.name, tank.liquid), dtype=float) / tank.density)
@@ -71,8 +72,10 @@ def mass_line(construction: Construction, edges: ArrayLike, liquid: Mapping[str,
     return np.diff(below)
 
 
-def rotary_line(construction: Construction, edges: ArrayLike) -> NDArray[np.float64]:
-    """Return the rotary inertia of the sections in each element (n,), kg m2, about a lateral axis through each section.
+def rotary_line(
+    construction: Construction, edges: ArrayLike, liquid: Mapping[str, ArrayLike] | None = None
+) -> NDArray[np.float64]:
+    """Return the rotary inertia of the sections in each element (..., n), kg m2, about a lateral axis through each.
 
     A mass of radius of gyration r has mass r^2 / 2; liquid has none (``mass_properties``).
 
@@ -81,12 +84,22 @@ def rotary_line(construction: Construction, edges: ArrayLike) -> NDArray[np.floa
     construction : Construction
     edges : (n + 1,) array
         Metres forward of the gimbal plane.
+    liquid : mapping, optional
+        As of ``mass_line``.
     """
-    station = _stations(construction, edges)
+    station, amounts = _stations(construction, edges), liquid or {}
     below = np.zeros(station.size)
     for item in construction.masses:
-        below += 0.5 * item.mass * item.radius**2 * _share_below(item, station)
+        mass = _amount(amounts, item.name, item.mass)
+        below = below + 0.5 * mass * item.radius**2 * _share_below(item.begin, item.end, station)
+    for grain in construction.grains:
+        inertia = grain.rotary_inertia(_amount(amounts, grain.name, grain.propellant))
+        below = below + inertia * _share_below(grain.begin, grain.end, station)
     return np.diff(below)
+
+
+def _amount(liquid: Mapping[str, ArrayLike], name: str, at_release: float) -> NDArray[np.float64]:
+    return np.asarray(liquid.get(name, at_release), dtype=float)[..., None]
 
 
 def _stations(construction: Construction, edges: ArrayLike) -> NDArray[np.float64]:
@@ -96,9 +109,9 @@ def _stations(construction: Construction, edges: ArrayLike) -> NDArray[np.float6
     return station
 
 
-def _share_below(item: LumpedMass, station: NDArray[np.float64]) -> NDArray[np.float64]:
+def _share_below(begin: float, end: float, station: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the share of a mass aft of stations; a point mass on an edge belongs to the element forward of it."""
-    if item.end > item.begin:
-        return np.clip((station - item.begin) / (item.end - item.begin), 0.0, 1.0)
-    element = min(int(np.searchsorted(station, item.begin, side="right")) - 1, station.size - 2)
+    if end > begin:
+        return np.clip((station - begin) / (end - begin), 0.0, 1.0)
+    element = min(int(np.searchsorted(station, begin, side="right")) - 1, station.size - 2)
     return (np.arange(station.size) > element).astype(float)

@@ -35,15 +35,16 @@ class MassProperties:
 def mass_properties(construction: Construction, liquid: Mapping[str, ArrayLike]) -> MassProperties:
     """Sum masses and liquid by exact integrals.
 
-    A mass between two stations is uniform there; a ring of its radius of gyration r adds m r^2 / 2. Liquid is slices of
+    A mass between two stations is uniform there; a ring of its radius of gyration r adds m r^2 / 2. A grain is a tube
+    whose port widens alike everywhere. Liquid is slices of
     the tank's area that count as points on the axis: without viscosity a slice does not turn with its wall.
 
     Parameters
     ----------
     construction : Construction
     liquid : mapping
-        Tank name to the liquid in it (kg), each of shape (n,) or a number; a tank that is left out holds what it
-        holds at release.
+        Tank, grain or dropped item to what is there of it (kg), each of shape (n,) or a number; what is left out is
+        there as at release.
 
     Raises
     ------
@@ -52,14 +53,20 @@ def mass_properties(construction: Construction, liquid: Mapping[str, ArrayLike])
     DataError
         More liquid than the tank holds.
     """
-    require_known_tanks(construction, liquid)
+    require_known_stores(construction, liquid)
     mass = first = second = np.zeros(())
     for item in construction.masses:
         begin, end = (construction.forward_of_gimbal(s) for s in (item.begin, item.end))
-        middle = 0.5 * (begin + end)
-        mass = mass + item.mass
-        first = first + item.mass * middle
-        second = second + item.mass * (middle**2 + (end - begin) ** 2 / 12 + item.radius**2 / 2)
+        middle, there = 0.5 * (begin + end), np.asarray(liquid.get(item.name, item.mass), dtype=float)
+        mass = mass + there
+        first = first + there * middle
+        second = second + there * (middle**2 + (end - begin) ** 2 / 12 + item.radius**2 / 2)
+    for grain in construction.grains:
+        begin, end = (construction.forward_of_gimbal(s) for s in (grain.begin, grain.end))
+        middle, there = 0.5 * (begin + end), np.asarray(liquid.get(grain.name, grain.propellant), dtype=float)
+        mass = mass + there
+        first = first + there * middle
+        second = second + there * (middle**2 + (end - begin) ** 2 / 12) + grain.rotary_inertia(there)
     for tank in construction.tanks:
         shape = TankShape.of(tank)
         level = shape.level(np.asarray(liquid.get(tank.name, tank.liquid), dtype=float) / tank.density)
@@ -72,9 +79,9 @@ def mass_properties(construction: Construction, liquid: Mapping[str, ArrayLike])
     return MassProperties(mass, center, second - mass * center**2)
 
 
-def require_known_tanks(construction: Construction, liquid: Mapping[str, object]) -> None:
-    """Refuse the name of a tank that the vehicle does not have."""
-    names = [tank.name for tank in construction.tanks]
+def require_known_stores(construction: Construction, liquid: Mapping[str, object]) -> None:
+    """Refuse the name of a tank, grain or dropped item that the vehicle does not have."""
+    names = list(construction.stores)
     for name in liquid:
         if name not in names:
             raise UnknownNameError("tank", name, names)
