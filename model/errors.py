@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar, cast
+
+Part = TypeVar("Part")
 
 
 class AscentwindError(Exception):
@@ -99,6 +101,12 @@ class DataErrorCollector:
             self.errors += several.errors
         except DataError as error:
             self.errors.append(error)
+
+    def take(self, read: Callable[[], Part]) -> Part:
+        """Return what a part gives; after an error, which is kept, what is returned must not be used."""
+        with self.part():
+            return read()
+        return cast("Part", None)
 
     def raise_all(self) -> None:
         """Raise what was kept, if anything.

@@ -5,7 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from ..errors import DataError, UnknownNameError
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import DataError, DataErrorCollector, UnknownNameError
 from .consistency import (
     refuse_misplaced,
     refuse_repeated_engines,
@@ -90,66 +93,103 @@ class Construction:
     jettisons: tuple[Jettison, ...] = ()
 
     def __post_init__(self):
+        collector = DataErrorCollector()
+        checks = (
+            self._check_places,
+            lambda: refuse_repeated_masses(self.masses, self.tanks, self.grains),
+            lambda: refuse_repeated_engines(self.engines),
+            lambda: refuse_repeated_jettisons(self.jettisons),
+            lambda: refuse_repeated_forces(self.normal_force),
+            lambda: refuse_repeated_stations(self.load_stations, self.stiffness),
+            *(lambda m=mass: m.require_within(self.aft_end, self.forward_end) for mass in self.masses),
+            *(lambda t=tank: self._check_tank(t) for tank in self.tanks),
+            *(lambda g=grain: self._check_grain(g) for grain in self.grains),
+            *(lambda j=jettison: self._check_time(j) for jettison in self.jettisons),
+            lambda: self._check_reach("stiffness is", self.stiffness.station),
+            self._check_load_stations,
+            self._check_outline,
+            self._check_modes,
+        )
+        for check in checks:
+            with collector.part():
+                check()
+        if not self.engines:
+            collector.errors.append(DataError("the vehicle has no engines; add [[engines]]"))
+        collector.raise_all()
+        self._check_names()
+
+    def _check_places(self) -> None:
         places = {"gimbal_station_m": [self.gimbal_station], "sensor_station_m": [self.sensor_station]}
         for component in self.normal_force:
             places[f"normal_force.{component.name}.station_m"] = [float(s) for s in component.station[[0, -1]]]
         refuse_misplaced(self.aft_end, self.forward_end, places)
-        refuse_repeated_masses(self.masses, self.tanks, self.grains)
-        refuse_repeated_engines(self.engines)
-        refuse_repeated_jettisons(self.jettisons)
-        refuse_repeated_forces(self.normal_force)
-        refuse_repeated_stations(self.load_stations, self.stiffness)
-        for mass in self.masses:
-            mass.require_within(self.aft_end, self.forward_end)
-        for tank in self.tanks:
-            if tank.bottom < self.aft_end or tank.top > self.forward_end:
-                raise DataError(f"tank '{tank.name}' lies beyond the vehicle's ends; correct its sections")
-            capacity = TankShape.of(tank).capacity
-            if tank.liquid > tank.density * capacity:
-                raise DataError(
-                    f"tank '{tank.name}' is overfilled: {tank.liquid:g} kg at {tank.density:g} kg/m3 take "
-                    f"{tank.liquid / tank.density:.4g} m3 of {capacity:.4g} m3; correct liquid, density or sections"
-                )
-        ends = self.stiffness.station[[0, -1]]
-        if ends[0] > self.aft_end or ends[1] < self.forward_end:
+
+    def _check_tank(self, tank: Tank) -> None:
+        if tank.bottom < self.aft_end or tank.top > self.forward_end:
+            raise DataError(f"tank '{tank.name}' lies beyond the vehicle's ends; correct its sections")
+        capacity = TankShape.of(tank).capacity
+        if tank.liquid > tank.density * capacity:
             raise DataError(
-                f"stiffness is given from {ends[0]:g} to {ends[1]:g} m, the vehicle reaches from {self.aft_end:g} to "
+                f"tank '{tank.name}' is overfilled: {tank.liquid:g} kg at {tank.density:g} kg/m3 take "
+                f"{tank.liquid / tank.density:.4g} m3 of {capacity:.4g} m3; correct liquid, density or sections"
+            )
+
+    def _check_grain(self, grain: Grain) -> None:
+        slack = 1e-6 * (self.forward_end - self.aft_end)
+        if grain.begin < self.aft_end - slack or grain.end > self.forward_end + slack:
+            raise DataError(f"grain '{grain.name}' lies beyond the vehicle's ends; correct its stations")
+
+    def _check_time(self, jettison: Jettison) -> None:
+        if not self.site.release < jettison.time < self.end_time:
+            raise DataError(
+                f"jettison '{jettison.event}' at {jettison.time:g} s does not lie between release and end_time_s, "
+                f"{self.site.release:g} and {self.end_time:g} s; correct time_s"
+            )
+
+    def _check_reach(self, what: str, station: NDArray[np.float64]) -> None:
+        if station[0] > self.aft_end or station[-1] < self.forward_end:
+            raise DataError(
+                f"{what} given from {station[0]:g} to {station[-1]:g} m, the vehicle reaches from {self.aft_end:g} to "
                 f"{self.forward_end:g} m; add stations"
             )
-        slack = 1e-6 * (self.forward_end - self.aft_end)
-        for grain in self.grains:
-            if grain.begin < self.aft_end - slack or grain.end > self.forward_end + slack:
-                raise DataError(f"grain '{grain.name}' lies beyond the vehicle's ends; correct its stations")
-        for jettison in self.jettisons:
-            jettison.require_known(
-                [m.name for m in self.masses], [g.name for g in self.grains], [c.name for c in self.normal_force]
+
+    def _check_load_stations(self) -> None:
+        for station in self.load_stations:
+            if not self.aft_end < station < self.forward_end:
+                raise DataError(f"load station {station:g} m is not on the vehicle; choose one between its ends")
+
+    def _check_outline(self) -> None:
+        if self.outline is not None:
+            self._check_reach("the outline is", self.outline.station)
+            for tank in self.tanks:
+                self.outline.require_around(tank)
+
+    def _check_modes(self) -> None:
+        if self.modes is None:
+            return
+        count = self.modes.frequency.shape[1]
+        if count != self.bending_modes:
+            raise DataError(
+                f"is {self.bending_modes}, but {count} modes are given; make them equal", column="bending_modes"
             )
-            if not self.site.release < jettison.time < self.end_time:
-                raise DataError(
-                    f"jettison '{jettison.event}' at {jettison.time:g} s does not lie between release and end_time_s, "
-                    f"{self.site.release:g} and {self.end_time:g} s; correct time_s"
-                )
+        ends, slack = self.modes.station[[0, -1]], 1e-6 * (self.forward_end - self.aft_end)
+        if abs(ends[0] - self.aft_end) > slack or abs(ends[1] - self.forward_end) > slack:
+            raise DataError(
+                f"modes are given from {ends[0]:g} to {ends[1]:g} m, the vehicle reaches from {self.aft_end:g} to "
+                f"{self.forward_end:g} m; give them from end to end"
+            )
+
+    def _check_names(self) -> None:
+        """Refuse names of things that are not there."""
         names = [*(tank.name for tank in self.tanks), *(grain.name for grain in self.grains)]
         for group in self.engines:
             for tank in (*group.draws, *group.residual):
                 if tank not in names:
                     raise UnknownNameError("tank", tank, names)
-        for station in self.load_stations:
-            if not self.aft_end < station < self.forward_end:
-                raise DataError(f"load station {station:g} m is not on the vehicle; choose one between its ends")
-        if self.outline is not None:
-            ends = self.outline.station[[0, -1]]
-            if ends[0] > self.aft_end or ends[1] < self.forward_end:
-                raise DataError(
-                    f"the outline is given from {ends[0]:g} to {ends[1]:g} m, the vehicle reaches from "
-                    f"{self.aft_end:g} to {self.forward_end:g} m; add stations"
-                )
-            for tank in self.tanks:
-                self.outline.require_around(tank)
-        if self.modes is not None:
-            self._check_modes(self.modes)
-        if not self.engines:
-            raise DataError("the vehicle has no engines; add [[engines]]")
+        for jettison in self.jettisons:
+            jettison.require_known(
+                [m.name for m in self.masses], [g.name for g in self.grains], [c.name for c in self.normal_force]
+            )
 
     @property
     def stores(self) -> dict[str, float]:
@@ -160,19 +200,6 @@ class Construction:
             **{grain.name: grain.propellant for grain in self.grains},
             **{item.name: item.mass for item in self.masses if item.name in dropped},
         }
-
-    def _check_modes(self, modes: GivenModes) -> None:
-        count = modes.frequency.shape[1]
-        if count != self.bending_modes:
-            raise DataError(
-                f"is {self.bending_modes}, but {count} modes are given; make them equal", column="bending_modes"
-            )
-        ends, slack = modes.station[[0, -1]], 1e-6 * (self.forward_end - self.aft_end)
-        if abs(ends[0] - self.aft_end) > slack or abs(ends[1] - self.forward_end) > slack:
-            raise DataError(
-                f"modes are given from {ends[0]:g} to {ends[1]:g} m, the vehicle reaches from {self.aft_end:g} to "
-                f"{self.forward_end:g} m; give them from end to end"
-            )
 
     def forward_of_gimbal(self, station: float) -> float:
         """Return metres forward of the gimbal plane."""

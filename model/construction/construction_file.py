@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, get_args
 
 import numpy as np
 
-from ..errors import DataError, PlausibilityWarning, suggestion
+from ..errors import DataError, DataErrorCollector, PlausibilityWarning, SeveralDataErrors, suggestion
 from ..files.csv_table import CsvTable, Order, read_csv_table
 from ..files.folder_files import file_inside
 from ..files.toml_file import read_toml
@@ -19,6 +19,7 @@ from .construction import Construction
 from .construction_entries import (
     ConstructionFile,
     EngineEntry,
+    FileEntry,
     JettisonEntry,
     NormalForceEntry,
     PitchEntry,
@@ -63,29 +64,36 @@ def load_construction(folder: Path, changes: Mapping[str, Any] | None = None) ->
     Raises
     ------
     DataError
-        File, key or column, and row of what cannot be used, and what to do.
+        File, key or column, and row of what cannot be used, and what to do; of all files together.
     UnknownNameError
         An engine draws from a tank that is not there.
     """
     toml = file_inside(folder, CONSTRUCTION_FILE)
     entry = read_toml(toml, ConstructionFile, changes)
-    masses = read_masses(file_inside(folder, entry.masses.file), entry.aft_end_m, entry.forward_end_m)
-    stiffness = read_stiffness(file_inside(folder, entry.stiffness.file))
-    modes = None if entry.modes is None else read_modes(file_inside(folder, entry.modes.file))
-    drag = _drag(file_inside(folder, entry.drag.file))
-    outline = None if entry.outline is None else _outline(file_inside(folder, entry.outline.file))
-    atmosphere = None if entry.atmosphere is None else _atmosphere(file_inside(folder, entry.atmosphere.file))
-    engines = tuple(_engine(folder, e) for e in entry.engines)
-    motors = tuple(_solid_motor(folder, e, entry.site.release_s) for e in entry.solid_motors)
-    jettisons = tuple(_jettison(folder, e) for e in entry.jettisons)
-    normal_force = tuple(_normal_force(folder, e) for e in entry.normal_force)
-    _refuse_unused_parts(folder, entry.normal_force)
-    with _located(toml):
+    collector = DataErrorCollector()
+    take = collector.take
+
+    def at(file: FileEntry) -> Path:
+        return file_inside(folder, file.file)
+
+    masses = take(lambda: read_masses(at(entry.masses), entry.aft_end_m, entry.forward_end_m))
+    stiffness = take(lambda: read_stiffness(at(entry.stiffness)))
+    modes = take(lambda: None if entry.modes is None else read_modes(at(entry.modes)))
+    drag = take(lambda: _drag(at(entry.drag)))
+    outline = take(lambda: None if entry.outline is None else _outline(at(entry.outline)))
+    atmosphere = take(lambda: None if entry.atmosphere is None else _atmosphere(at(entry.atmosphere)))
+    engines = [take(lambda e=e: _engine(folder, e)) for e in entry.engines]
+    motors = [take(lambda e=e: _solid_motor(folder, e, entry.site.release_s)) for e in entry.solid_motors]
+    jettisons = [take(lambda e=e: _jettison(folder, e)) for e in entry.jettisons]
+    normal_force = [take(lambda e=e: _normal_force(folder, e)) for e in entry.normal_force]
+    take(lambda: _refuse_unused_parts(folder, entry.normal_force))
+    with collector.part(), _located(toml):
         pitch = _pitch(file_inside(folder, entry.pitch.file), entry.pitch)
     tanks = []
     for tank in entry.tanks:
-        with _located(toml, f"tanks.{tank.name}"):
+        with collector.part(), _located(toml, f"tanks.{tank.name}"):
             tanks.append(_tank(tank))
+    collector.raise_all()
     with _located(toml):
         construction = Construction(
             name=entry.name,
@@ -98,7 +106,7 @@ def load_construction(folder: Path, changes: Mapping[str, Any] | None = None) ->
             tanks=tuple(tanks),
             stiffness=stiffness,
             bending_modes=entry.bending_modes,
-            normal_force=normal_force,
+            normal_force=tuple(normal_force),
             drag=drag,
             engines=(*engines, *(group for group, _ in motors)),
             pitch=pitch,
@@ -110,7 +118,7 @@ def load_construction(folder: Path, changes: Mapping[str, Any] | None = None) ->
             outline=outline,
             modes=modes,
             grains=tuple(grain for _, grain in motors),
-            jettisons=jettisons,
+            jettisons=tuple(jettisons),
         )
     check_sizes(construction, toml)
     return construction
@@ -132,59 +140,62 @@ def _located(file: Path, column: str | None = None, row: int | None = None) -> I
     try:
         yield
     except DataError as error:
-        if error.file is not None:
-            raise
-        raise DataError(error.why, file=file, column=column or error.column, row=row) from None
+        collector = DataErrorCollector()
+        for e in error.errors if isinstance(error, SeveralDataErrors) else (error,):
+            placed = e if e.file is not None else DataError(e.why, file=file, column=column or e.column, row=row)
+            collector.errors.append(placed)
+        collector.raise_all()
 
 
 def _read(
-    file: Path, argument: str, unit: str, order: Order = "increasing", text: tuple[str, ...] = _ORIGIN
+    file: Path,
+    argument: str,
+    unit: str,
+    columns: Iterable[tuple[str, str, str]],
+    order: Order = "increasing",
+    text: tuple[str, ...] = _ORIGIN,
 ) -> CsvTable:
+    """Read a table with columns by name, unit and sign: '+' positive, '0' not negative, '' any."""
     table = read_csv_table(file, argument, unit, order=order, text=text)
+    collector = DataErrorCollector()
+    for name, of_column, sign in columns:
+        with collector.part():
+            table.column(name, of_column)
+            if sign:
+                table.require_positive(name, allow_zero=sign == "0")
     for status, line in zip(table.text["status"], table.lines, strict=True):
         if status not in get_args(Status):
-            raise DataError(
-                f"'{status}' is not a status; write one of {', '.join(get_args(Status))}",
-                file=file,
-                column="status",
-                row=line,
-            )
+            why = f"'{status}' is not a status; write one of {', '.join(get_args(Status))}"
+            collector.errors.append(DataError(why, file=file, column="status", row=line))
+    collector.raise_all()
     return table
 
 
 def read_masses(file: Path, aft_end: float = -math.inf, forward_end: float = math.inf) -> tuple[LumpedMass, ...]:
     """Read a table of masses; as :func:`load_construction`."""
-    table = _read(file, "begin", "m", "any", ("item", *_ORIGIN))
+    units = (("end", "m", ""), ("mass", "kg", ""), ("radius_of_gyration", "m", ""))
+    table = _read(file, "begin", "m", units, "any", ("item", *_ORIGIN))
     columns = zip(
-        table.text["item"],
-        table.column("begin", "m"),
-        table.column("end", "m"),
-        table.column("mass", "kg"),
-        table.column("radius_of_gyration", "m"),
-        strict=True,
+        table.text["item"], *(table.columns[n] for n in ("begin", "end", "mass", "radius_of_gyration")), strict=True
     )
-    masses = []
+    masses, collector = [], DataErrorCollector()
     lines: dict[str, int] = {}
     for line, (item, begin, end, mass, radius) in zip(table.lines, columns, strict=True):
         if lines.setdefault(item, line) != line:
-            raise DataError(
-                f"'{item}' stands in line {lines[item]} already; remove or rename one",
-                file=file,
-                column="item",
-                row=line,
-            )
-        with _located(file, row=line):
+            why = f"'{item}' stands in line {lines[item]} already; remove or rename one"
+            collector.errors.append(DataError(why, file=file, column="item", row=line))
+        with collector.part(), _located(file, row=line):
             masses.append(LumpedMass(item, float(begin), float(end), float(mass), float(radius)))
             masses[-1].require_within(aft_end, forward_end)
+    collector.raise_all()
     return tuple(masses)
 
 
 def read_stiffness(file: Path) -> Stiffness:
     """Read a table of stiffness; as :func:`load_construction`."""
-    table = _read(file, "station", "m", "not decreasing", ("item", *_ORIGIN))
-    bending, shear = table.column("bending", "N m2"), table.column("shear", "N")
-    for column in ("bending", "shear"):
-        table.require_positive(column)
+    units = (("bending", "N m2", "+"), ("shear", "N", "+"))
+    table = _read(file, "station", "m", units, "not decreasing", ("item", *_ORIGIN))
+    bending, shear = table.columns["bending"], table.columns["shear"]
     _warn_of_bridged_items(table)
     with _located(file):
         return Stiffness(table.columns["station"], bending, shear)
@@ -206,7 +217,6 @@ def _warn_of_bridged_items(table: CsvTable) -> None:
 
 def read_modes(file: Path) -> GivenModes:
     """Read a table of modes, of any normalisation and sign; as :func:`load_construction`."""
-    table = _read(file, "time", "s", "not decreasing")
     units = {
         "mode": "1",
         "frequency": "rad/s",
@@ -215,7 +225,8 @@ def read_modes(file: Path) -> GivenModes:
         "displacement": "1",
         "rotation": "1/m",
     }
-    time, columns = table.columns["time"], {name: table.column(name, unit) for name, unit in units.items()}
+    table = _read(file, "time", "s", ((name, unit, "") for name, unit in units.items()), "not decreasing")
+    time, columns = table.columns["time"], {name: table.columns[name] for name in units}
     times, stations = np.unique(time), np.unique(columns["station"])
     count = int(columns["mode"].max())
     order = np.lexsort((columns["station"], columns["mode"], time))
@@ -250,33 +261,27 @@ def read_modes(file: Path) -> GivenModes:
 
 
 def _outline(file: Path) -> Outline:
-    table = _read(file, "station", "m", "not decreasing", ("item", *_ORIGIN))
-    radius = table.column("radius", "m")
-    table.require_positive("radius", allow_zero=True)
+    table = _read(file, "station", "m", (("radius", "m", "0"),), "not decreasing", ("item", *_ORIGIN))
+    radius = table.columns["radius"]
     with _located(file):
         return Outline(table.columns["station"], radius)
 
 
 def _drag(file: Path) -> Drag:
-    table = _read(file, "mach", "1")
-    table.column("coefficient", "1")
-    table.require_positive("coefficient", allow_zero=True)
+    table = _read(file, "mach", "1", (("coefficient", "1", "0"),))
     return Drag(table.columns["mach"], table.columns["coefficient"])
 
 
 def _atmosphere(file: Path) -> AtmosphereFactors:
-    table = _read(file, "altitude", "m")
-    density, temperature = table.column("density_factor", "1"), table.column("temperature_factor", "1")
-    for column in ("density_factor", "temperature_factor"):
-        table.require_positive(column)
+    table = _read(file, "altitude", "m", (("density_factor", "1", "+"), ("temperature_factor", "1", "+")))
+    density, temperature = table.columns["density_factor"], table.columns["temperature_factor"]
     return AtmosphereFactors(table.columns["altitude"], density, temperature)
 
 
 def _engine(folder: Path, entry: EngineEntry) -> EngineGroup:
-    table = _read(file_inside(folder, entry.file), "time", "s")
-    thrust, flow = table.column("vacuum_thrust", "N"), table.column("mass_flow", "kg/s")
-    for column in ("vacuum_thrust", "mass_flow"):
-        table.require_positive(column)
+    units = (("vacuum_thrust", "N", "+"), ("mass_flow", "kg/s", "+"))
+    table = _read(file_inside(folder, entry.file), "time", "s", units)
+    thrust, flow = table.columns["vacuum_thrust"], table.columns["mass_flow"]
     with _located(folder / CONSTRUCTION_FILE, f"engines.{entry.name}"):
         return EngineGroup(
             name=entry.name,
@@ -296,10 +301,9 @@ def _engine(folder: Path, entry: EngineEntry) -> EngineGroup:
 def _solid_motor(folder: Path, entry: SolidMotorEntry, release: float) -> tuple[EngineGroup, Grain]:
     """Read a motor; its flow is scaled, within ``FLOW_ERROR``, so that it burns what is in the grain."""
     toml, column = folder / CONSTRUCTION_FILE, f"solid_motors.{entry.name}"
-    table = _read(file_inside(folder, entry.file), "time", "s")
-    time, thrust, flow = table.columns["time"], table.column("vacuum_thrust", "N"), table.column("mass_flow", "kg/s")
-    for name in ("vacuum_thrust", "mass_flow"):
-        table.require_positive(name, allow_zero=True)
+    units = (("vacuum_thrust", "N", "0"), ("mass_flow", "kg/s", "0"))
+    table = _read(file_inside(folder, entry.file), "time", "s", units)
+    time, thrust, flow = (table.columns[name] for name in ("time", "vacuum_thrust", "mass_flow"))
     if time[0] > release and (thrust[0] > 0 or flow[0] > 0):
         raise DataError(
             f"begins with {thrust[0]:g} N and {flow[0]:g} kg/s at {time[0]:g} s, after release at {release:g} s; begin "
@@ -353,8 +357,8 @@ def _jettison(folder: Path, entry: JettisonEntry) -> Jettison:
 
 
 def _normal_force(folder: Path, entry: NormalForceEntry) -> NormalForceComponent:
-    table = _read(file_inside(folder, entry.file), "mach", "1")
-    slope = table.column(entry.name, "1/rad")
+    table = _read(file_inside(folder, entry.file), "mach", "1", ((entry.name, "1/rad", ""),))
+    slope = table.columns[entry.name]
     with _located(folder / CONSTRUCTION_FILE, f"normal_force.{entry.name}"):
         return NormalForceComponent(
             entry.name, np.array(entry.station_m), np.array(entry.shape), table.columns["mach"], slope
@@ -364,7 +368,7 @@ def _normal_force(folder: Path, entry: NormalForceEntry) -> NormalForceComponent
 def _refuse_unused_parts(folder: Path, entries: tuple[NormalForceEntry, ...]) -> None:
     """Refuse a column of the normal force that no part names."""
     for name in dict.fromkeys(e.file for e in entries):
-        table = _read(file_inside(folder, name), "mach", "1")
+        table = _read(file_inside(folder, name), "mach", "1", ())
         parts = [e.name for e in entries if e.file == name]
         for column in table.columns:
             if column != "mach" and column not in parts:
@@ -380,8 +384,8 @@ def _pitch(file: Path, entry: PitchEntry) -> PitchProgramme:
     none = np.zeros(0)
     segments, time, angle = np.zeros((0, 7)), none, none
     if entry.kind == "polynomials":
-        table = _read(file, "begin", "s")
-        columns = [table.column(name, unit) for name, unit in _POLYNOMIAL]
+        table = _read(file, "begin", "s", ((name, unit, "") for name, unit in _POLYNOMIAL))
+        columns = [table.columns[name] for name, _ in _POLYNOMIAL]
         segments = np.column_stack([*columns[:2], *(np.radians(c) for c in columns[2:])])
         gap = np.flatnonzero(segments[1:, 0] != segments[:-1, 1])
         if gap.size:
@@ -393,8 +397,8 @@ def _pitch(file: Path, entry: PitchEntry) -> PitchProgramme:
                 row=table.lines[gap[0] + 1],
             )
     else:
-        table = _read(file, "time", "s")
-        time, angle = table.columns["time"], np.radians(table.column("pitch", "deg"))
+        table = _read(file, "time", "s", (("pitch", "deg", ""),))
+        time, angle = table.columns["time"], np.radians(table.columns["pitch"])
     last = float(segments[-1, 1] if entry.kind == "polynomials" else time[-1])
     if entry.arrest_s is not None and entry.arrest_s > last + 1e-9:
         raise DataError(

@@ -13,7 +13,7 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy.io import loadmat
 
-from ..errors import DataError, suggestion
+from ..errors import DataError, DataErrorCollector, suggestion
 from ..files.csv_table import read_rows
 from ..files.numbers import parse_number
 from .arrays import SHAPES
@@ -173,40 +173,45 @@ def _read_matlab_hdf5(path: Path) -> tuple[dict[str, Any], dict[str, list[str]]]
 
 
 def _read_folder(folder: Path) -> ArrayFile:
-    names, more = _read_names(folder / "names.csv") if (folder / "names.csv").is_file() else ({}, {})
-    tables = {name: _read_table(folder / f"{name}.csv", name) for name in SHAPES if (folder / f"{name}.csv").is_file()}
-    missing = [name for name in ("A", "B", "C") if name not in tables]
-    if missing:
-        raise DataError(f"holds no {missing[0]}.csv", file=folder)
+    collector, names, more = DataErrorCollector(), {}, {}
+    with collector.part():
+        names, more = _read_names(folder / "names.csv") if (folder / "names.csv").is_file() else ({}, {})
+    tables = {
+        name: collector.take(lambda n=name: _read_table(folder / f"{n}.csv", n))
+        for name in (*SHAPES, "u")
+        if (folder / f"{name}.csv").is_file()
+    }
+    missing = [DataError(f"holds no {name}.csv", file=folder) for name in ("A", "B", "C") if name not in tables]
+    collector.errors += missing
+    collector.raise_all()
+    of_u = tables.pop("u", None)
     times = tables["A"][0]
     counts = {kind: len(labels) for kind, labels in names.items()}
     for name, (_, entries) in tables.items():
         for place in (0, 1):
             kind, reached = SHAPES[name][place], max((at[place] for at in entries), default=0)
             if kind in names and reached > counts[kind]:
-                raise DataError(
-                    f"has an entry in {('row', 'column')[place]} {reached}, and names.csv {counts[kind]} {kind}",
-                    file=folder / f"{name}.csv",
-                )
+                why = f"has an entry in {('row', 'column')[place]} {reached}, and names.csv {counts[kind]} {kind}"
+                collector.errors.append(DataError(why, file=folder / f"{name}.csv"))
             counts[kind] = max(counts.get(kind, 0), reached)
-    matrices = {}
-    for name, (own_times, entries) in tables.items():
+    for name, (own_times, _) in (tables if of_u is None else tables | {"u": of_u}).items():
         if not np.array_equal(own_times, times):
-            raise DataError("has other times than A.csv", file=folder / f"{name}.csv", column="time [s]")
+            why = "has other times than A.csv"
+            collector.errors.append(DataError(why, file=folder / f"{name}.csv", column="time [s]"))
+    sources = list(dict.fromkeys(more.get("sources", {}).get(n, n) for n in names.get("noises", ())))
+    starts = collector.take(lambda: _read_starts(folder / "start_covariance.csv", sources, counts["states"]))
+    collector.raise_all()
+    matrices = {}
+    for name, (_, entries) in tables.items():
         rows, columns = (counts.get(kind, 0) for kind in SHAPES[name])
         matrices[name] = np.zeros((times.size, rows, columns))
         for (i, j), values in entries.items():
             matrices[name][:, i - 1, j - 1] = values
     u = None
-    if (folder / "u.csv").is_file():
-        own_times, entries = _read_table(folder / "u.csv", "u")
-        if not np.array_equal(own_times, times):
-            raise DataError("has other times than A.csv", file=folder / "u.csv", column="time [s]")
-        u = np.zeros((times.size, max((i for i, _ in entries), default=0)))
-        for (i, _), values in entries.items():
+    if of_u is not None:
+        u = np.zeros((times.size, max((i for i, _ in of_u[1]), default=0)))
+        for (i, _), values in of_u[1].items():
             u[:, i - 1] = values
-    sources = list(dict.fromkeys(more.get("sources", {}).get(n, n) for n in names.get("noises", ())))
-    starts = _read_starts(folder / "start_covariance.csv", sources, counts["states"])
     given = {k: v for k, v in more.items() if k != "jumps"}
     return ArrayFile(
         times, matrices, u, names, start_covariance=starts, jumps=tuple(more.get("jumps", {}).values()), **given
@@ -214,12 +219,13 @@ def _read_folder(folder: Path) -> ArrayFile:
 
 
 def _numbers(file: Path, line: int, cells: Iterable[str], header: list[str]) -> list[float]:
-    found = []
+    found, collector = [], DataErrorCollector()
     for column, cell in zip(header, cells, strict=True):
         try:
             found.append(parse_number(cell))
         except ValueError as error:
-            raise DataError(str(error), file=file, row=line, column=column) from None
+            collector.errors.append(DataError(str(error), file=file, row=line, column=column))
+    collector.raise_all()
     return found
 
 
@@ -239,11 +245,13 @@ def _read_table(file: Path, name: str) -> tuple[NDArray[np.float64], dict[tuple[
         if place in places:
             raise DataError("is there twice", file=file, column=cell)
         places.append(place)
-    values = []
+    values, collector = [], DataErrorCollector()
     for line, cells in rows[1:]:
-        if len(cells) != len(header):
-            raise DataError(f"has {len(cells)} cells under {len(header)} columns", file=file, row=line)
-        values.append(_numbers(file, line, cells, header))
+        with collector.part():
+            if len(cells) != len(header):
+                raise DataError(f"has {len(cells)} cells under {len(header)} columns", file=file, row=line)
+            values.append(_numbers(file, line, cells, header))
+    collector.raise_all()
     array = np.array(values)
     return array[:, 0], {place: array[:, k] for k, place in enumerate(places, 1)}
 
@@ -252,23 +260,24 @@ def _read_names(file: Path) -> tuple[dict[str, list[str]], dict[str, dict[str, A
     """Return names by kind, and units, scales, sources and jumps by name."""
     names: dict[str, list[str]] = {}
     more: dict[str, dict[str, Any]] = {"units": {}, "scales": {}, "sources": {}, "jumps": {}}
-    kinds = {label: kind for kind, label in KINDS.items()}
+    kinds, collector = {label: kind for kind, label in KINDS.items()}, DataErrorCollector()
     columns = ["kind", "number", "name", "unit", "scale", "source"]
     for line, cells in read_rows(file):
         kind, _, name, unit, scale, source = [*(c.strip() for c in cells), *[""] * 6][:6]
         if [c.strip() for c in cells][:3] == columns[:3]:
             continue
-        if kind == "jump":
-            more["jumps"][str(line)] = _numbers(file, line, [name], ["name"])[0]
-            continue
-        if kind not in kinds:
-            raise DataError(
-                f"'{kind}' is no kind{suggestion(kind, [*kinds, 'jump'])}", file=file, row=line, column="kind"
-            )
-        names.setdefault(kinds[kind], []).append(name)
-        more["units"] |= {name: unit} if unit else {}
-        more["scales"] |= {name: _numbers(file, line, [scale], ["scale"])[0]} if scale else {}
-        more["sources"] |= {name: source} if source else {}
+        with collector.part():
+            if kind == "jump":
+                more["jumps"][str(line)] = _numbers(file, line, [name], ["name"])[0]
+                continue
+            if kind not in kinds:
+                why = f"'{kind}' is no kind{suggestion(kind, [*kinds, 'jump'])}"
+                raise DataError(why, file=file, row=line, column="kind")
+            names.setdefault(kinds[kind], []).append(name)
+            more["units"] |= {name: unit} if unit else {}
+            more["sources"] |= {name: source} if source else {}
+            more["scales"] |= {name: _numbers(file, line, [scale], ["scale"])[0]} if scale else {}
+    collector.raise_all()
     return names, more
 
 

@@ -130,7 +130,8 @@ def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehi
         why = 'is of the linear mean, and mean_response = "nonlinear"; leave one of them out'
         reader.collector.errors.append(DataError(why, file=toml, column="options.trajectory_angle_of_attack"))
     reader.collector.errors += [DataError(why, file=toml, column=key) for key, why in name_faults(file)]
-    file = _with_noise_loads(file, folder, toml)
+    with reader.collector.part():
+        file = _with_noise_loads(file, folder, toml)
     names = plane_names(file)
     reader.add("rigid_body", file.tables.rigid_body, RIGID_BODY)
     flown = tuple(column for column in _ASKED_FOR if column in _asked_of_trajectory(file))
@@ -138,18 +139,23 @@ def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehi
     own_angles = _own_angles(reader, file.tables.trajectory)
     reader.add("propulsion", file.tables.propulsion, PROPULSION)
     if len(names) == 1:
-        _add_tables(reader, plane_file(file, next(iter(names))))
+        with reader.collector.part():
+            _add_tables(reader, plane_file(file, next(iter(names))))
         _add_moment_of_inertia(reader, file, names[0], "")
     else:
-        _add_tables(reader, file)
+        with reader.collector.part():
+            _add_tables(reader, file)
         for name in names:
-            _add_plane(reader, file, name)
+            with reader.collector.part():
+                _add_plane(reader, file, name)
     wind = turbulence = None
     with reader.collector.part():
         wind = _load_both(file.wind, reader) if file.planes == BOTH else _load_wind(file, reader)
         turbulence = _load_turbulence(file.wind.turbulence, wind, reader)
+    zoned = file if len(names) > 1 else plane_file(file, next(iter(names)))
+    strips = reader.collector.take(lambda: _read_strips(reader, zoned))
     reader.collector.raise_all()
-    zones = _load_zones(reader, file if len(names) > 1 else plane_file(file, next(iter(names))))
+    zones = None if strips is None else _make_zones(reader, zoned, strips)
     for name, noise in file.noise.items():
         for table in noise.tables:
             if table not in reader.tables:
@@ -189,8 +195,10 @@ def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehi
         own_angles=own_angles,
     )
     for plane in flown_planes(vehicle):
-        check_plausibility(plane.vehicle)
+        with reader.collector.part():
+            check_plausibility(plane.vehicle)
     _check_coverage(reader, wind, turbulence, start, last.last)
+    reader.collector.raise_all()
     if file.wind.air_speed == "mean_wind":
         vehicle = through_mean_wind(vehicle)
     return with_biased_programme(vehicle) if file.options.wind_biased_programme else vehicle
@@ -254,11 +262,10 @@ def _add_tables(reader: _Reader, file: VehicleFile, scope: str = "", wanted: fro
         answer, zones = file.options.slosh_reaction, zone_count(file) > 1
         if answer or zones:
             if load.station.forward_of_gimbal_m is None:
-                key = "slosh_reaction" if answer else "gust_zones"
-                raise DataError(
-                    f"is missing, but options.{key} needs it; give metres forward of the gimbal plane",
-                    file=reader.toml,
-                    column=f"{scope}loads.{load.output}.forward_of_gimbal_m",
+                why = f"is missing, but options.{'slosh_reaction' if answer else 'gust_zones'} needs it"
+                reader.refuse(
+                    f"{why}; give metres forward of the gimbal plane",
+                    f"{scope}loads.{load.output}.forward_of_gimbal_m",
                 )
             columns |= dict.fromkeys(load.reaction if answer else load.reaction[1:])
         unused = (*by_need, *(load.local_columns(modes) if load.is_shear else ()))
@@ -283,11 +290,8 @@ def _add_plane(reader: _Reader, file: VehicleFile, plane: str) -> None:
         ("loads", len(file.bending) != len(own.bending), "another number of bending modes"),
     ):
         if differs and needs not in stated and getattr(file, needs):
-            raise DataError(
-                f"is missing, but this plane has {what}, and {needs} have columns for each; give its own",
-                file=reader.toml,
-                column=f"{plane}.{needs}",
-            )
+            why = f"is missing, but this plane has {what}, and {needs} have columns for each; give its own"
+            raise DataError(why, file=reader.toml, column=f"{plane}.{needs}")
     _add_tables(reader, own, f"{plane}.", frozenset((*stated, *own_tables(entry))))
     _add_moment_of_inertia(reader, file, plane, f"{plane}.")
 
@@ -338,9 +342,7 @@ def _add_load_relief(reader: _Reader, file: VehicleFile, scope: str) -> None:
             reader.add(f"{scope}load_relief.{sensor}", entry.modes, mode_columns(len(file.bending)), prefix)
         elif file.bending:
             columns = ", ".join(column.label for column in mode_columns(len(file.bending)))
-            raise DataError(
-                f"is missing; name a table of {columns} at the sensor", file=reader.toml, column=f"{prefix}modes"
-            )
+            reader.refuse(f"is missing; name a table of {columns} at the sensor", f"{prefix}modes")
 
 
 def _add_local(reader: _Reader, file: VehicleFile, scope: str, wanted: frozenset[str]) -> None:
@@ -350,13 +352,14 @@ def _add_local(reader: _Reader, file: VehicleFile, scope: str, wanted: frozenset
         "is missing, but options.local_angle_of_attack needs it; 'ascentwind build-vehicle' makes it",
     )
     if file.tables.local_aerodynamics is None:
-        raise DataError(missing, file=reader.toml, column="tables.local_aerodynamics")
-    if "local_aerodynamics" in wanted:
+        reader.refuse(missing, "tables.local_aerodynamics")
+    elif "local_aerodynamics" in wanted:
         table = file.tables.local_aerodynamics
         reader.add(f"{scope}local_aerodynamics", table, local_columns(modes), f"{scope}{PREFIX}")
     for load in lateral_loads(file) if "loads" in wanted else ():
         if load.local is None:
-            raise DataError(missing, file=reader.toml, column=f"{scope}loads.{load.output}.local")
+            reader.refuse(missing, f"{scope}loads.{load.output}.local")
+            continue
         name = f"{scope}{PREFIX}loads.{load.output}"
         rest = (*load.columns(modes, ()), *load.by_need(modes)) if load.is_shear else ()
         reader.add(name, load.local, load.local_columns(modes), f"{name}.", rest)
@@ -373,6 +376,10 @@ class _Reader:
         self.discontinuities: set[float] = set()
         self.collector = DataErrorCollector()
         self.schedules: dict[str, tuple[Table, Path]] = {}
+
+    def refuse(self, why: str, key: str) -> None:
+        """Keep what is wrong with a key of vehicle.toml."""
+        self.collector.errors.append(DataError(why, file=self.toml, column=key))
 
     def read(
         self,
@@ -394,12 +401,12 @@ class _Reader:
                 csv.column(column.name, column.unit)
                 if column.sign:
                     csv.require_positive(column.name, allow_zero=column.sign == "0")
-        collector.raise_all()
         unknown = set(csv.columns) - {column.name for column in (*columns, *unused)} - {argument.name}
-        if unknown:
-            first, known = sorted(unknown)[0], [column.name for column in columns]
-            why = f"is not a column that this table uses{suggestion(first, known)}; remove it"
-            raise DataError(why, file=csv.file, column=first)
+        known = [column.name for column in columns]
+        for extra in sorted(unknown):
+            why = f"is not a column that this table uses{suggestion(extra, known)}; remove it"
+            collector.errors.append(DataError(why, file=csv.file, column=extra))
+        collector.raise_all()
         self.sources.append(TableSource(name, csv.file, entry.status, entry.source, float(x[0]), float(x[-1])))
         return csv
 
@@ -435,15 +442,18 @@ class _Reader:
         _warn_of_gap(csv, 4 if entry.interpolation in ("cubic", "pchip") else 10)
         if entry.interpolation == "step":
             self.discontinuities.update(x[1:].tolist())
+        collector = DataErrorCollector()
         for column, unit, sign, _ in columns:
             try:
                 table = Table(prefix + column, unit, x, csv.columns[column], entry.interpolation, breaks)
                 self._check_between_rows(table, sign)
             except DataError as error:
-                raise DataError(error.why, file=csv.file, column=column, time=error.time) from None
+                collector.errors.append(DataError(error.why, file=csv.file, column=column, time=error.time))
+                continue
             self.tables[table.name] = table
             if "control." in name:
                 self.schedules[name] = (table, csv.file)
+        collector.raise_all()
 
     def breaks(self, name: str, entry: TableEntry) -> tuple[float, ...]:
         """Return the times (s) at which a table may jump."""
@@ -516,7 +526,10 @@ def _load_both(entry: WindEntry, reader: _Reader) -> TwoComponentWind:
     assert entry.azimuth_deg is not None and entry.components is not None
     _check_azimuth(entry.azimuth_deg, reader)
     parts, r = entry.components, entry.components.record
+    file = file_inside(reader.folder, parts.filter)
+    filters = reader.collector.take(lambda: read_two_component_filter(file))
     csv = reader.read("wind", parts.statistics, WIND_COMPONENTS, ALTITUDE)
+    reader.collector.raise_all()
     h, record = csv.columns["altitude"], None
     if r is None:
         _warn_of_no_record(reader.toml, "wind.components.record", "--components both")
@@ -524,8 +537,6 @@ def _load_both(entry: WindEntry, reader: _Reader) -> TwoComponentWind:
         origin = WindOrigin(r.site, BOTH, r.period, r.edition)
         azimuth = math.radians(entry.azimuth_deg)
         record = WindRecord(origin, azimuth, 1, r.held_above_m, r.source, r.independent_samples)
-    file = file_inside(reader.folder, parts.filter)
-    filters = read_two_component_filter(file)
     low, high = (float(x) for x in filters.joint.altitude[[0, -1]])
     reader.sources.append(TableSource("wind.filter", file, "computed", filters.joint.source, low, high))
     winds, interpolation = [], parts.statistics.interpolation
@@ -567,7 +578,10 @@ def _check_azimuth(azimuth_deg: float, reader: _Reader) -> None:
 
 def _load_wind(vehicle: VehicleFile, reader: _Reader) -> WindModel:
     folder, entry = reader.folder, vehicle.wind
+    file = reader.toml if entry.filter is None else file_inside(folder, entry.filter)
+    fitted = reader.collector.take(lambda: read_filter(file)) if entry.fitted else None
     csv = reader.read("wind", entry.statistics, WIND, ALTITUDE)
+    reader.collector.raise_all()
     h, mean, sigma = (csv.columns[name] for name in ("altitude", "mean", "standard_deviation"))
     record = _wind_record(entry.record, vehicle.planes, reader.toml)
     if entry.azimuth_deg is not None and record is not None:
@@ -591,14 +605,12 @@ def _load_wind(vehicle: VehicleFile, reader: _Reader) -> WindModel:
     interpolation = entry.statistics.interpolation
     mean_table = Table("wind.mean", "m/s", h, mean, interpolation)
     deviation = Table("wind.standard_deviation", "m/s", h, sigma, interpolation)
-    if entry.fitted:
-        assert entry.filter is not None  # checked by WindEntry
-        file = file_inside(folder, entry.filter)
-        shaping_filter = read_filter(file)
+    if fitted is not None:
+        shaping_filter = fitted
         low, high = (float(x) for x in shaping_filter.altitude[[0, -1]])
         reader.sources.append(TableSource("wind.filter", file, "computed", shaping_filter.source, low, high))
     else:
-        assert entry.correlation is not None
+        assert entry.correlation is not None  # checked by WindEntry, as the filter
         knots, file = entry.correlation, reader.toml
         kernel = TwoPartKernel(
             *(
@@ -614,10 +626,10 @@ def _load_wind(vehicle: VehicleFile, reader: _Reader) -> WindModel:
         raise DataError(error.why, file=file) from None
 
 
-def _load_zones(reader: _Reader, file: VehicleFile) -> Zones | None:
-    """Return the gust zones of a vehicle and put their tables among the others; None where it feels one wind."""
-    entry, tables, count = file.tables.normal_force_along_vehicle, reader.tables, zone_count(file)
-    if count == 1:
+def _read_strips(reader: _Reader, file: VehicleFile) -> Strips | None:
+    """Return the strips of a vehicle with gust zones; None where it feels one wind."""
+    entry = file.tables.normal_force_along_vehicle
+    if zone_count(file) == 1:
         if is_turbulent(file) and entry is None and file.options.gust_zones is None:
             warnings.warn(
                 WindWarning(
@@ -637,12 +649,18 @@ def _load_zones(reader: _Reader, file: VehicleFile) -> Zones | None:
     modes = len(file.bending)
     columns = (*ALONG_ARGUMENTS[1:], *normal_force_columns(modes))
     csv = reader.read("zones", entry, columns, TIME, order="not decreasing")
-    strips = Strips.read(csv, modes, entry.interpolation, reader.breaks("zones", entry))
+    return Strips.read(csv, modes, entry.interpolation, reader.breaks("zones", entry))
+
+
+def _make_zones(reader: _Reader, file: VehicleFile, strips: Strips) -> Zones:
+    """Return the gust zones of a vehicle and put their tables among the others."""
+    entry, tables = file.tables.normal_force_along_vehicle, reader.tables
+    assert entry is not None  # the strips are its
     time, low = strips.time, reader.file.start_time_s
     values = {n: tables[n].polynomial(time) for n in ("dynamic_pressure", "center_of_gravity", "relative_velocity")}
     places = [load.forward_of_gimbal_m for load in file.loads if load.forward_of_gimbal_m is not None]
     weight = np.where(time >= low, values["dynamic_pressure"], 0.0)
-    zones = make_zones(strips, count, weight, places, csv.file)
+    zones = make_zones(strips, zone_count(file), weight, places, file_inside(reader.folder, entry.file))
     found = [*zones.tables(), *zones.rate_tables(values["relative_velocity"])]
     for load in lateral_loads(file):
         assert load.station.forward_of_gimbal_m is not None  # its error was raised
@@ -722,11 +740,12 @@ def _check_coverage(
     """Hold schedules of the control system and the wind against the part of the flight that they must cover."""
     flight = loaded_flight(reader.tables, start, end)
     for name, (table, file) in reader.schedules.items():
-        check_schedule(name, table, flight, file)
+        with reader.collector.part():
+            check_schedule(name, table, flight, file)
     try:
         check_winds(wind, flight)
     except DataError as error:
-        raise DataError(error.why, file=reader.toml, column="wind") from None
+        reader.collector.errors.append(DataError(error.why, file=reader.toml, column="wind"))
     entry = reader.file.wind.turbulence
     if turbulence is not None and entry is not None and entry.intensity is not None:
         try:

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...model.construction import Construction
 from ...model.construction.construction_file import CONSTRUCTION_FILE, construction_files, load_construction
-from ...model.errors import DataError, OutputFolderError
+from ...model.errors import DataError, DataErrorCollector, OutputFolderError
 from ...model.files.folder_files import file_inside, unsafe_to_copy
 from ...model.vehicle.noise_loads import has_axial
 from ...model.vehicle.plausibility import station_in_name
@@ -61,8 +61,10 @@ def build_vehicle(
         Raw inputs that cannot be used, or that vehicle.toml contradicts.
     OutputFolderError
     """
-    file = read_vehicle_file(file_inside(folder, VEHICLE_FILE))
-    construction = load_construction(folder)
+    collector = DataErrorCollector()
+    file = collector.take(lambda: read_vehicle_file(file_inside(folder, VEHICLE_FILE)))
+    construction = collector.take(lambda: load_construction(folder))
+    collector.raise_all()
     check_agreement(folder / VEHICLE_FILE, file, construction)
     check_outputs(folder, file)
     if out is not None and out.exists() and (not out.is_dir() or any(out.iterdir())):
@@ -104,10 +106,11 @@ def inputs_hash(folder: Path) -> str:
 
 
 def check_agreement(toml: Path, file: VehicleFile, construction: Construction) -> None:
-    """Refuse a vehicle.toml that contradicts its construction.toml."""
+    """Refuse a vehicle.toml that contradicts its construction.toml; all that differs together."""
+    collector = DataErrorCollector()
 
     def refuse(why: str, key: str) -> None:
-        raise DataError(why, file=toml, column=key)
+        collector.errors.append(DataError(why, file=toml, column=key))
 
     if file.name != construction.name:
         refuse(f"is '{file.name}', but {CONSTRUCTION_FILE} tells of '{construction.name}'; make them equal", "name")
@@ -178,6 +181,7 @@ def check_agreement(toml: Path, file: VehicleFile, construction: Construction) -
                 "correct it",
                 f"loads.{i}.forward_of_gimbal_m",
             )
+    collector.raise_all()
 
 
 def check_outputs(folder: Path, file: VehicleFile) -> None:

@@ -249,7 +249,7 @@ BAD = [
     ("construction.toml", '["Booster cases"]', '["Booster case"]', "no item of masses 'Booster case'; did you mean"),
     ("construction.toml", 'name = "booster"', 'name = "s1_lox"', "two tanks, motors or masses named 's1_lox'"),
     ("construction.toml", 'burnout_event = "booster_burnout"\n', "", "solid_motors.0.burnout_event': is missing"),
-    ("construction/booster.csv", "0,80000,30", "5,80000,30", "line 2: begins with 80000 N .* begin with a row of zeros"),
+    ("construction/booster.csv", "0,80000,30", "5,80000,30", "line 2: begins with 80000 N .* a row of zeros"),
     ("construction/booster.csv", "28,80000,30", "28,-80000,30", "'vacuum_thrust', line 3: -80000 is not allowed"),
     ("construction/booster.csv", "[kg/s]", "[lb/s]", r"column 'mass_flow': unit is \[lb/s\]"),
 ]  # fmt: skip
