@@ -7,7 +7,7 @@ import io
 import re
 import shutil
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from ...model.construction.construction_file import CONSTRUCTION_FILE, construction_files
@@ -22,8 +22,17 @@ COPIED = "copied from "
 SOURCE = re.compile(rf'(?<![\w"\'])((?:\w+_)?source\s*=\s*")(?!"|{COPIED})')
 
 
-def copy_vehicle(source: str | Path, folder: Path) -> list[Path]:
-    """Copy a vehicle into a new folder and name it after the folder.
+def copy_vehicle(
+    source: str | Path,
+    folder: Path,
+    name: str | None = None,
+    title: str | None = None,
+    change: Callable[[Path], None] | None = None,
+) -> list[Path]:
+    """Copy a vehicle into a new folder and name it after the folder, or as told.
+
+    ``change`` is called with the copy before it is put in place.
+
 
     The copy has a title of its own, and its sources say that they were copied: its figures and files carry no other
     vehicle's name as theirs.
@@ -38,8 +47,9 @@ def copy_vehicle(source: str | Path, folder: Path) -> list[Path]:
     origin = vehicle.name
     if folder.resolve().is_relative_to(start.resolve()):
         raise OutputFolderError(f"{folder} lies inside {start}, the vehicle to copy; choose a folder beside it")
-    name = re.sub(r"[^A-Za-z0-9_]", "_", folder.resolve().name)
-    name = name if name[:1].isalpha() else f"vehicle_{name}"
+    if name is None:
+        name = re.sub(r"[^A-Za-z0-9_]", "_", folder.resolve().name)
+        name = name if name[:1].isalpha() else f"vehicle_{name}"
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise OutputFolderError(f"{folder} exists already and is not empty; choose another folder")
     try:
@@ -50,7 +60,7 @@ def copy_vehicle(source: str | Path, folder: Path) -> list[Path]:
             for toml in sorted(made.glob("*.toml")):
                 text = sourced(toml.read_text(encoding="utf-8-sig", errors="surrogateescape"), origin)
                 if toml.name in (VEHICLE_FILE, CONSTRUCTION_FILE):
-                    text = renamed(text, name, origin)
+                    text = renamed(text, name, origin, title)
                 toml.write_text(text, encoding="utf-8", errors="surrogateescape")
             if (made / CONSTRUCTION_FILE).is_file():
                 for file in construction_files(made)[1:]:
@@ -58,6 +68,8 @@ def copy_vehicle(source: str | Path, folder: Path) -> list[Path]:
             for file, columns in table_columns(vehicle.file).items():
                 table = made / file
                 table.write_text(explained(table.read_text(encoding="utf-8-sig"), columns), encoding="utf-8")
+            if change is not None:
+                change(made)
             made.replace(folder)
     except OSError as error:
         raise OutputFolderError(f"{folder} cannot be made ({error.strerror or error}); choose another folder") from None
@@ -74,11 +86,12 @@ def explained(text: str, columns: Iterable[Column]) -> str:
     return "\n".join([*lines[:header], *new, *lines[header:]]) + "\n"
 
 
-def renamed(text: str, name: str, origin: str) -> str:
+def renamed(text: str, name: str, origin: str, title: str | None = None) -> str:
     """Return a TOML file under another vehicle's name, with a title of its own."""
     text = re.sub(r"(?m)^name = .*$", f'name = "{name}"', text, count=1)
-    title = f'title = "{name}, started from {origin}"  # of figures and files: describe your vehicle here'
-    text = re.sub(r"(?m)^title = .*$", title, text, count=1)
+    line = f'title = "{name}, started from {origin}"  # of figures and files: describe your vehicle here'
+    line = line if title is None else f'title = "{title}"'
+    text = re.sub(r"(?m)^title = .*$", lambda _: line, text, count=1)
     return (
         f"# {name}: made from {origin} by 'ascentwind new-vehicle'. It tells of {origin} until you change it,\n"
         f"# and so does every source that begins with '{COPIED}{origin}'.\n\n{text}"

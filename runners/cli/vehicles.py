@@ -30,11 +30,25 @@ def vehicles() -> None:
 def new_vehicle(
     folder: Annotated[Path, typer.Argument(help="Folder to make.")],
     source: Annotated[str, typer.Option("--from", help="Vehicle to start from.")] = "as504",
+    name: Annotated[str | None, typer.Option(help="Letters, digits and _; the folder's without it.")] = None,
+    title: Annotated[str | None, typer.Option(help="Of figures and files.")] = None,
+    site: Annotated[str | None, typer.Option(help="NAME or NAME,LATITUDE (deg) of the launch.")] = None,
+    azimuth: Annotated[
+        float | None, typer.Option(parser=number, help="Of the flight, deg from north towards east.")
+    ] = None,
+    month: Annotated[str | None, typer.Option(help="Of the wind: month in English, or annual.")] = None,
 ) -> None:
-    """A vehicle folder of your own to edit: one TOML file and CSV tables."""
+    """A vehicle folder of your own to edit: one TOML file and CSV tables. At a terminal, asks for what is not given."""
+    from .first_choices import Choices, asked, put_in_place, site_of
     from .new_vehicle import copy_vehicle
 
-    copied = copy_vehicle(source, folder)
+    choices = asked(Choices(name, title, *site_of(site), azimuth, month), folder)
+    said: list[str] = []
+    copied = copy_vehicle(
+        source, folder, choices.name, choices.title, lambda made: said.extend(put_in_place(choices, made))
+    )
+    for sentence in said:
+        console.print(sentence, soft_wrap=True, markup=False)
     console.print(f"{len(copied)} files in {folder}; edit vehicle.toml, then 'ascentwind run {folder}'", soft_wrap=True)
 
 

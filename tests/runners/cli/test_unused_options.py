@@ -107,7 +107,7 @@ KNOWN = {
         "changes",
     },
     "vehicles": set(),
-    "new-vehicle": {"source"},
+    "new-vehicle": {"source", "name", "title", "site", "azimuth", "month"},
     "inspect": {"time", "changes"},
     "regenerate": {"out", "changes"},
     "doctor": set(),
