@@ -18,6 +18,7 @@ from ...codegen.system.executable import ExecutableSystem
 from ...model.equations.vehicle_tables import vehicle_tables
 from ...model.errors import ParameterValueError, PlanesError
 from ...model.system.names import COMBINED, WIND
+from ...model.system.time_tables import group_over_time
 from ...model.tables import Table
 from ...model.vehicle.vehicle import Vehicle
 from ...model.wind.shaping_filter import ShapingFilter
@@ -27,7 +28,7 @@ from ..solvers.adjoint import AdjointSolver
 from ..solvers.integration import CvodesSettings
 from ..solvers.mean_response import mean_response, with_mean_tables
 from .gradient import gradient_of
-from .knots import vehicle_rows
+from .knots import table_rows, vehicle_rows
 from .one import sensitivity
 from .request import Request
 
@@ -125,17 +126,18 @@ def check_sensitivity(
         derivatives.append(derivative)
         differences.append(_difference(of_factor, 1.0, STEP, value))
     for k in _largest_rows(found, rows):
-        vehicle = case.vehicle_for("a table row")
         name, number = str(found["knot_table"].values[k]), float(found["knot_value"].values[k])
         row = int(np.sum(found["knot_table"].values[:k] == name))
 
-        def of_row(x: float, vehicle: Vehicle = vehicle, name: str = name, row: int = row) -> float:
-            return _value(of_vehicle(executable, _with_row(vehicle, name, row, x)), request, time)
+        def of_row(x: float, name: str = name, row: int = row) -> float:
+            if case.vehicle is None:
+                return _value(_of_rows(executable, name, row, x), request, time)
+            return _value(of_vehicle(executable, _with_row(case.vehicle, name, row, x)), request, time)
 
         labels.append(f"{name} at {found['knot_argument'].values[k]:g}")
         at.append(number)
         derivatives.append(float(found["knot_derivative"].values[k]))
-        differences.append(_difference(of_row, number, STEP * _reach(vehicle, name, row), value))
+        differences.append(_difference(of_row, number, STEP * _reach(case, name, row), value))
     return _agreement(labels, np.array(at), np.array(derivatives), differences, value, found.attrs)
 
 
@@ -147,6 +149,24 @@ def of_vehicle(executable: ExecutableSystem, vehicle: Vehicle) -> ExecutableSyst
     wind[rows, rows] = covariance
     changed = replace(system, start_covariance={**system.start_covariance, WIND: wind})
     return replace(executable, system=changed, groups=vehicle_tables(vehicle))
+
+
+def _of_rows(executable: ExecutableSystem, name: str, row: int, value: float) -> ExecutableSystem:
+    """Return the same code with another value in a row of a system's own tables."""
+
+    def changed(table: Table) -> Table:
+        values = table.values.copy()
+        values[row] = value
+        return replace(table, values=values)
+
+    rows = [changed(table) if table.name == name else table for table in executable.system.rows]
+    groups = tuple(
+        group_over_time(group.name, rows, float(group.knots[0]), float(group.knots[-1]))[0]
+        if name in group.names
+        else group
+        for group in executable.groups
+    )
+    return executable.with_numbers(groups=groups)
 
 
 def _value(executable: ExecutableSystem, request: Request, time: float) -> float:
@@ -177,10 +197,11 @@ def _grouped_factors(found: xr.Dataset, parameters: Iterable[str] | None) -> lis
     return [(name, tables.split(", "), derivative) for name, tables, derivative in zip(*parts, strict=True)]
 
 
-def _reach(vehicle: Vehicle, name: str, row: int) -> float:
-    """Return by how much a row may move: its own size, or for the altitude, which must increase, its rise."""
-    values = vehicle_rows(vehicle)[name].values
-    return abs(float(np.diff(values)[max(row - 1, 0)] if name == "altitude" else values[row]))
+def _reach(case: Case, name: str, row: int) -> float:
+    """Return by how much a row may move: its own size, or for a vehicle's altitude, which must increase, its rise."""
+    values = table_rows(case)[name].values
+    rises = case.vehicle is not None and name == "altitude"
+    return abs(float(np.diff(values)[max(row - 1, 0)] if rises else values[row]))
 
 
 def _with_row(vehicle: Vehicle, name: str, row: int, value: float) -> Vehicle:

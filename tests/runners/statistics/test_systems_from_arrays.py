@@ -87,6 +87,26 @@ def test_derivatives_by_rows_are_those_of_the_closed_form(cache):
     assert float(by_gain) == pytest.approx(float(found.attrs["value"]) / 1.5, rel=1e-9)
 
 
+@pytest.mark.parametrize("interpolation", ["linear", "cubic", "pchip", "step"])
+def test_derivatives_by_rows_are_held_against_differences(interpolation):
+    """For systems from arrays with a jump, and from symbols with tables, as for vehicles."""
+    times = np.array([0.0, 0.7, 1.5, 2.0, 2.0, 2.6, 3.3, 4.0])
+    rate = np.array([0.2, 1.0, 0.7, 0.4, 2.0, 1.4, 0.9, 0.5])
+    A, B = -rate[:, None, None], np.linspace(1.0, 2.0, 8)[:, None, None] ** 2
+    system = LinearSystem.from_arrays(times, A, B, [[1.0]], name="rows", interpolation=interpolation)
+    t, x, w, a, b = (ca.SX.sym(s) for s in "txwab")
+    defined = define_system(
+        "tabulated", time=t, states={"x": (x, -a * x + b * w)}, noises={"w": w}, outputs={"x": x},
+        tables={"a": (a, [0.0, 1.0, 2.0, 3.0, 4.0], rate[3:]), "b": (b, [0.0, 5.0], [1.0, 2.0])},
+    )  # fmt: skip
+    for of, at in ((system, 3.0), (defined, 3.5)):
+        study = Study.from_system(of, compile=False)
+        found = study.check_sensitivity(of.output_names[0], at, rows=2)
+        tables = [str(item).partition(" at ")[0] for item in found.item.values if " at " in str(item)]
+        assert sorted(tables) == sorted(table.name for table in of.rows)
+        assert found["agrees"].all(), found.to_dataframe().to_string()
+
+
 @pytest.mark.skipif(not TABLE.exists(), reason="the published table is not beside the repository")
 def test_a_launcher_of_13_states_agrees_with_the_covariance_equation_of_scipy(cache):
     times, A, B, C = launcher()
