@@ -167,7 +167,7 @@ def difference_from_core(executable: ExecutableSystem, points: int = 2, seed: in
         interval = executable.integrator_parameters(time, 1.0, begin, end)
         at_time = (time, begin, end, p, executable.address)
         backward, forward = functions.adjoint(0, adjoint, [], interval, []), functions.mean(0, x, [], interval, [])
-        pairs = [
+        pairs: list[tuple[ca.DM | NDArray, ca.DM | NDArray]] = [
             *zip(
                 functions.matrices(*at_time),
                 [core.state_matrix(time, v, p), *core.other_matrices(time, v, p)],

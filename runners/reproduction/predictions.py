@@ -84,7 +84,7 @@ def larger_sides(statistics: ResponseStatistics, source: str) -> xr.DataArray:
 def responses(statistics: ResponseStatistics) -> Responses:
     """Return the numbers of a full table of responses."""
     sources = [name for name in (WIND, TURBULENCE) if name in statistics.variance["source"].values]
-    of_wind = np.sqrt(statistics.variance.sel(source=sources).sum("source"))
+    of_wind = statistics.variance.sel(source=sources).sum("source") ** 0.5
     both, wind = larger_sides(statistics, COMBINED), larger_side(statistics.mean.sel(source=WIND), of_wind)
     at = {"response": ATTACK, "time": TIME}
 

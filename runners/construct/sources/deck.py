@@ -124,7 +124,8 @@ def read_deck(file: Path, mapping: MappingFile, expected_mass: float | None) -> 
             why = f"no CBAR or CBEAM joins GRID {grids[i]} to GRID {grids[i + 1]}, its neighbour on the centreline"
             raise DataError(f"{why}; add it, or take the grids off 'grids'", file=file)
         item = ", ".join(name for name, _, _ in parts)
-        bending, shear = (np.sum([part[k] for part in parts], axis=0) for k in (1, 2))
+        bending = np.sum([own for _, own, _ in parts], axis=0)
+        shear = np.sum([own for _, _, own in parts], axis=0)
         for end in (0, 1):
             rows.append(StiffnessRow(item, float(station[i + end]), float(bending[end]), float(shear[end])))
     _check_mass(file, lump, masses, station, expected_mass, mapping)

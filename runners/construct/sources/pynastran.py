@@ -23,7 +23,7 @@ def pynastran(module: str, name: str) -> Any:
     """
     lent = not hasattr(np, "in1d")
     if lent:
-        vars(np)["in1d"] = np.isin  # pyNastran 1.4 takes it by that name, which NumPy 2.4 has no more
+        np.__dict__["in1d"] = np.isin  # pyNastran 1.4 takes it by that name, which NumPy 2.4 has no more
     try:
         return getattr(importlib.import_module(f"pyNastran.{module}"), name)
     except ImportError as error:
@@ -32,7 +32,7 @@ def pynastran(module: str, name: str) -> Any:
         ) from None
     finally:
         if lent:
-            del vars(np)["in1d"]
+            del np.__dict__["in1d"]
 
 
 @contextmanager

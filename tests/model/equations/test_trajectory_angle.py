@@ -61,6 +61,7 @@ def test_own_angle_acts_as_its_wind_but_on_the_path_it_has_turned_already(plane)
 def test_own_angle_is_in_the_means_of_both_planes():
     """The deviations of thrust and centre of pressure act on the angle that is there, the flight's own included."""
     vehicle = in_both(OWN)
+    assert isinstance(vehicle.wind, TwoComponentWind)
     still = replace(
         vehicle.wind,
         **{
