@@ -14,6 +14,8 @@ from ...model.errors import UnknownNameError
 from ..solvers.adjoint import AdjointSolver
 from ..solvers.integration import CvodesSettings
 from ..statistics.larger_side import larger_side, side
+from ..statistics.peaks_of_resultants import laws_by_adjoint
+from ..statistics.resultants import outputs_of
 from ..study import Study
 from .peaks import SIGNS
 from .problem import DesignProblemError, LoadReliefProblem, family_words
@@ -59,7 +61,7 @@ class Quantity:
         End time or frozen time of the peak or of the least damping, s.
     limit : float or None
     side : str
-        Of a peak: the side on which it lies after the design.
+        Of a peak: the side on which it lies after the design; a resultant has none.
     """
 
     name: str
@@ -169,7 +171,7 @@ def design(
 
 @dataclass(frozen=True)
 class RecomputedPeak:
-    """|mean| + 3 sigma of a response at an end time, by the design's own engine and by CVODES."""
+    """|mean| + 3 sigma of a response, or a resultant's level, at an end time, by the design's own engine and CVODES."""
 
     response: str
     time: float
@@ -205,6 +207,11 @@ def recompute_peaks(result: DesignResult, relative_tolerance: float = 1e-11) -> 
     for k in np.flatnonzero(near.any(axis=0)):
         run = solver.run(problem.times[k])
         for r in np.flatnonzero(near[:, k]):
+            of = outputs_of(study, responses[r])
+            if len(of) == 2:
+                value = float(laws_by_adjoint(study, solver, problem.times[k], [responses[r]]).percentile()[0])
+                found.append(RecomputedPeak(responses[r], problem.times[k], float(largest[r, k]), value))
+                continue
             row = study.system.output_index(responses[r])
             value = larger_side(float(run.mean[row]), float(np.sqrt(run.variance[row].sum())))
             found.append(RecomputedPeak(responses[r], problem.times[k], float(largest[r, k]), float(value)))
@@ -272,7 +279,8 @@ def _quantities(search: Search, before: NDArray[np.float64], after: NDArray[np.f
     problem, points = search.problem, (search.point(before), search.point(after))
     found = []
     for r, response in enumerate(search.responses):
-        unit = problem.study.system.outputs[problem.study.system.output_index(response)].unit
+        of = outputs_of(problem.study, response)
+        unit = problem.study.system.outputs[problem.study.system.output_index(of[0])].unit
         largest = [p.peaks[r].max(axis=0) for p in points]
         times = [problem.times[int(np.argmax(x))] for x in largest]
         heights = [float(x.max()) for x in largest]
@@ -284,7 +292,7 @@ def _quantities(search: Search, before: NDArray[np.float64], after: NDArray[np.f
                 *heights,
                 *times,
                 limit=problem.peak_limits.get(response),
-                side=side(SIGNS[int(np.argmax(after_by_sign))]),
+                side=side(SIGNS[int(np.argmax(after_by_sign))]) if len(of) == 1 else "",
             )
         )
     frozen = [p.frozen for p in points if p.frozen is not None]

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ...model.errors import AscentwindError, ParameterValueError, TimeRangeError, UnknownNameError
 from ..solvers.frozen_roots import root_families
+from ..statistics.resultants import response_or_resultant
 
 if TYPE_CHECKING:
     from ..study import Study
@@ -34,9 +35,9 @@ class LoadReliefProblem:
     times : sequence of float
         End times t2, s; a peak is the largest value over them.
     response : str
-        Whose peak is minimised.
+        Whose peak is minimised; of a resultant of both planes the largest level passed with 1 - Phi(3) at an instant.
     peak_limits : mapping of str to float
-        Largest peak of |mean| + 3 sigma of other responses, SI.
+        Largest peak of |mean| + 3 sigma of other responses, or of the level of other resultants, SI.
     damping_limits : mapping of str to float
         Least damping ratio at the frozen times by family of roots: 'rigid_body' (with control networks and sensors),
         'bending_1', ..., 'slosh'.
@@ -74,8 +75,7 @@ class LoadReliefProblem:
         if not self.parameters:
             raise DesignProblemError("a design needs at least one parameter that may change")
         for name in (self.response, *self.peak_limits):
-            study.system.output_index(name)
-        study.checked_responses([self.response, *self.peak_limits])
+            response_or_resultant(study, name)
         if self.response in self.peak_limits:
             raise DesignProblemError(f"the peak of '{self.response}' is minimised; a limit on it has no place")
         families = root_families(study.system)

@@ -13,6 +13,7 @@ from rich.table import Table
 from ..present.files import write_text
 from ..present.style import display, words, write_figure
 from ..present.terminal import print_table
+from ..statistics.resultants import outputs_of
 from .design import DesignResult, RecomputedPeak, TradePoint
 from .trade_figure import trade_figure
 
@@ -25,7 +26,11 @@ def print_design(result: DesignResult, again: Sequence[RecomputedPeak], console:
     for name, (low, high) in result.problem.parameters.items():
         table.add_row(name, f"{result.start[name]:.5g}", f"{result.values[name]:.5g}", f"{low:g} and {high:g}")
     print_table(table, console)
-    table = Table("what", title="Peaks are of |mean| + 3σ, dampings the least at the frozen times")
+    problem = result.problem
+    of_two = any(len(outputs_of(problem.study, name)) == 2 for name in (problem.response, *problem.peak_limits))
+    resultants = ", of resultants levels passed with 0.00135" if of_two else ""
+    title = f"Peaks are of |mean| + 3σ{resultants}, dampings the least at the frozen times"
+    table = Table("what", title=title)
     for column in ("before", "after", "limit"):
         table.add_column(column, justify="right", no_wrap=True)
     for quantity in result.quantities:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear, minimize
 
 from ..solvers.frozen_roots import FrozenDamping, FrozenRoots, root_families
+from ..statistics.resultants import outputs_of
 from .peaks import SIGNS, Row, gradients, three_sigma
 from .problem import LoadReliefProblem
 
@@ -77,7 +78,8 @@ class Search:
         self._exact: dict[bytes, dict[Row, NDArray]] = {}
         self._last: dict[str, dict[Row, NDArray]] = {}
         outputs = problem.study.system.outputs
-        sizes = [outputs[problem.study.system.output_index(r)].scale for r in self.responses]
+        firsts = [outputs_of(problem.study, response)[0] for response in self.responses]
+        sizes = [outputs[problem.study.system.output_index(name)].scale for name in firsts]
         self._fallback = np.array(sizes)[:, None, None] * np.ones((len(self.responses), len(SIGNS), len(problem.times)))
         self.scale = self.height(problem.start)
 

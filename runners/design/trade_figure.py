@@ -8,6 +8,7 @@ from matplotlib import rc_context
 from matplotlib.figure import Figure
 
 from ..present.style import SHADES, STYLE, display, words
+from ..statistics.resultants import outputs_of
 from .design import TradePoint
 
 
@@ -25,7 +26,9 @@ def trade_figure(trades: Mapping[str, Sequence[TradePoint]], response: str, titl
     system = first.problem.study.system
     before = {q.name: q.before for q in first.quantities}
     (up, up_unit), (along, along_unit) = (
-        display(system.outputs[system.output_index(name)].unit, before[f"peak {name}"])
+        display(
+            system.outputs[system.output_index(outputs_of(first.problem.study, name)[0])].unit, before[f"peak {name}"]
+        )
         for name in (first.problem.response, response)
     )
     with rc_context(STYLE):
@@ -40,8 +43,12 @@ def trade_figure(trades: Mapping[str, Sequence[TradePoint]], response: str, titl
             along * before[f"peak {response}"], up * before[f"peak {first.problem.response}"],
             "*", color="black", ms=13, ls="none", label="start",
         )  # fmt: skip
-        axes.set_xlabel(f"limit on the peak of |mean| + 3σ {words(response)}, {along_unit}")
-        axes.set_ylabel(f"lowest peak of |mean| + 3σ {words(first.problem.response)}, {up_unit}")
+        below, beside = (
+            f"{'level of' if len(outputs_of(first.problem.study, name)) == 2 else '|mean| + 3σ'} {words(name)}"
+            for name in (response, first.problem.response)
+        )
+        axes.set_xlabel(f"limit on the peak of {below}, {along_unit}")
+        axes.set_ylabel(f"lowest peak of {beside}, {up_unit}")
         axes.legend()
         axes.set_title(title, loc="left")
     return figure

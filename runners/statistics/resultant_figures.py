@@ -63,7 +63,7 @@ def direction_figure(resultants: Resultants, resultant: str, title: str) -> Figu
     law = NormOfNormal(norm.mean[k], norm.covariance[k])
     factor, unit = display(peak.unit, peak.value)
     with rc_context(STYLE):
-        figure = Figure(figsize=(10.0, 5.8), layout="constrained")
+        figure = Figure(figsize=(10.0, 6.6), layout="constrained")
         left = figure.add_subplot(1, 2, 1)
         right: Any = figure.add_subplot(1, 2, 2, projection="polar")
         _ellipses(left, law, peak, factor, unit, chance)
@@ -80,8 +80,11 @@ def direction_figure(resultants: Resultants, resultant: str, title: str) -> Figu
         right.plot(AROUND, circle, "--", color=COLORS[COMBINED], lw=1.4, label=f"resultant, passed with {chance:.3g}")
         right.plot([peak.direction], [factor * peak.value], "o", color=COLORS[COMBINED])
         right.set_rlabel_position(math.degrees(peak.direction) + 180.0 + 22.5)  # away from the peak, between two rays
-        right.set_title(f"by direction, from +pitch (0°) towards +yaw (90°), {unit}", fontsize=10)
-        right.legend(loc="lower center", bbox_to_anchor=(0.5, -0.42))
+        right.legend(
+            loc="upper center",
+            bbox_to_anchor=(0.5, -0.1),
+            title=f"{unit}, from +pitch (0°) towards +yaw (90°)",
+        )
         figure.suptitle(wrapped(f"{title}, t = {peak.time:g} s"))
     return figure
 

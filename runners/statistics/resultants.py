@@ -49,6 +49,11 @@ def resultant_pairs(responses: Iterable[str]) -> dict[str, tuple[str, str]]:
     return {resultant_name(name): pair for name, pair in pairs if not any(part in name for part in NO_NORM)}
 
 
+def outputs_of(case: Case, name: str) -> tuple[str, ...]:
+    """Return the response of a name, or both responses that a resultant is the norm of."""
+    return resultant_pairs(case.system.output_names).get(name, (name,))
+
+
 def response_or_resultant(case: Case, name: str) -> str:
     """Return the name of a response or of a resultant of two with one unit.
 
