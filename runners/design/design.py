@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ...model.deprecation import warn_deprecated
 from ...model.errors import UnknownNameError
+from ..present.notebook import html_of
 from ..solvers.adjoint import AdjointSolver
 from ..solvers.integration import CvodesSettings
 from ..statistics.larger_side import larger_side, side
@@ -74,7 +75,7 @@ class Quantity:
     side: str = ""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class DesignResult:
     """A design.
 
@@ -117,6 +118,15 @@ class DesignResult:
     def peak(self) -> float:
         """Peak of |mean| + 3 sigma that was minimised, SI."""
         return self.quantities[0].after
+
+    def __repr__(self) -> str:
+        lines = [f"DesignResult of {self.problem.study.system.name}, {'' if self.converged else 'not '}stationary"]
+        lines += [f"{name}: {self.start[name]:.5g} before, {value:.5g} after" for name, value in self.values.items()]
+        lines += [f"{q.name}: {q.before:.5g} before, {q.after:.5g} {q.unit} after" for q in self.quantities]
+        return "\n  ".join(lines)
+
+    def _repr_html_(self) -> str:
+        return html_of(repr(self))
 
 
 def design(

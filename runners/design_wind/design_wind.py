@@ -25,6 +25,7 @@ from ..case.times import seconds
 from ..flight_load.load import FlightLoad
 from ..flight_load.request import NoVarianceError
 from ..gusts.weights import WindWeights, weights_of_rows
+from ..present.notebook import html_of
 from ..solvers.time_nodes import interval_before, time_nodes
 from ..statistics.engines import response_statistics
 from .files import write_wind
@@ -274,6 +275,9 @@ class DesignWind:
             f"{self.sigmas:g} sigma {kind} ({self.side})\n  {self.profile.sizes['altitude']} levels, a corner at "
             f"{self.altitude_at_time:.6g} m; the profile alone makes {self.load_by_wind:.6g} {self.unit}"
         )
+
+    def _repr_html_(self) -> str:
+        return html_of(repr(self))
 
 
 def _sigmas(source: str) -> tuple[str, str]:

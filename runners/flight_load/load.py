@@ -16,6 +16,7 @@ from scipy.special import ndtri_exp
 from ...model.errors import ParameterValueError
 from ..case.case import Case
 from ..case.provenance import provenance, wind_samples
+from ..present.notebook import html_of
 from ..statistics.percentiles import (
     Sides,
     checked_probabilities,
@@ -561,6 +562,9 @@ class FlightLoad:
             low, high = found.interval
             lines.append(f"passed with {p:g}: {found.value:.5g} ({low:.5g} to {high:.5g})")
         return "\n  ".join(lines)
+
+    def _repr_html_(self) -> str:
+        return html_of(repr(self))
 
     def _array(
         self, values: Iterable[object], name: str, more: tuple[str, ...] = (), unit: str | None = None

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..case.case import Case
 from ..case.provenance import provenance
+from ..present.notebook import html_of
 from ..statistics.percentiles import Sides
 from .crossings import Boundary
 from .norms import Norms, Process
@@ -201,6 +202,9 @@ class Passage:
             f"Passage of {names}: {p.value:.4g} of flights ({low:.3g} to {high:.3g})\n"
             f"  margin of safety at {self.design:g}: {self.margin_of_safety:+.4f}"
         )
+
+    def _repr_html_(self) -> str:
+        return html_of(repr(self))
 
     def _loads(self) -> dict[str, tuple]:
         return {

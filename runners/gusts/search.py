@@ -16,6 +16,7 @@ from ..case.climb import Climb
 from ..case.provenance import provenance
 from ..case.times import end_times, parse_times, spread_over
 from ..present.netcdf import RULE
+from ..present.notebook import html_of
 from .response import check_on_flight, checked_responses, described, gust_products
 from .shapes import LENGTHS, Gust, GustError
 from .weights import WindWeights, wind_weights
@@ -226,6 +227,9 @@ class GustSweep:
                 f"{worst.gust.length:.4g} m from {worst.start_altitude:.6g} m"
             )
         return "\n  ".join(lines)
+
+    def _repr_html_(self) -> str:
+        return html_of(repr(self))
 
 
 def gust_sweep(

@@ -38,6 +38,7 @@ from ..flight_load.process import Grid, JointOutputs, joint_covariance
 from ..flight_load.request import checked_draws
 from ..flight_load.window import checked_window, window_chain
 from ..present.netcdf import RULE
+from ..present.notebook import html_of
 from ..statistics.norm import NormOfNormal
 from ..statistics.percentiles import Sides, checked_sides
 from ..statistics.resultants import resultant_pairs
@@ -448,6 +449,9 @@ class DayOfLaunch:
     def __repr__(self) -> str:
         told = f"DayOfLaunch given {' and '.join(self.balloons.names)}: {', '.join(self.responses)}"
         return told if self.limits is None else f"{told}\n  {'go' if self.go else 'no-go'}: {self.probability:.3g}"
+
+    def _repr_html_(self) -> str:
+        return html_of(repr(self))
 
     def _unit(self, name: str) -> str:
         system = self.flight.case.system

@@ -22,6 +22,7 @@ from ..case.climb import Climb
 from ..case.provenance import provenance
 from ..case.times import end_times, parse_times
 from ..present.netcdf import RULE
+from ..present.notebook import html_of
 from ..solvers.discretisation import symmetric_root
 from ..statistics.engines import response_statistics
 from ..statistics.resultants import resultant_pairs
@@ -294,6 +295,9 @@ class FlownWinds:
         return f"FlownWinds: {n} profiles ({partly} partly observed), {self.weights.times.size} times, " + ", ".join(
             self.responses
         )
+
+    def _repr_html_(self) -> str:
+        return html_of(repr(self))
 
     def unit(self, response: str) -> str:
         """Return the unit of a response.

@@ -18,6 +18,7 @@ from ..case.provenance import provenance
 from ..case.times import parse_times
 from ..present.files import write_bytes
 from ..present.netcdf import RULE, one_unit_a_variable, with_conventions
+from ..present.notebook import html_of, shortened
 from ..statistics.dataset import QUANTITIES
 from ..statistics.sweep import Sweep
 from ..study import Study
@@ -35,7 +36,7 @@ LARGEST = 2**31  # bytes of a variable in the file format
 Progress = Callable[[int, int], None]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ParameterStudy:
     """A parameter study that has been computed.
 
@@ -61,6 +62,20 @@ class ParameterStudy:
     def computed(self) -> NDArray[np.bool_]:
         """Members that have numbers, (members,)."""
         return self.data["status"].values != FAILED
+
+    def __repr__(self) -> str:
+        failed, times = int((~self.computed).sum()), self.data["time"].values
+        lines = [
+            f"ParameterStudy of {self.study.system.name}, {self.plan.kind.replace('_', ' ')}",
+            f"members: {self.computed.size}" + (f", {failed} of them failed" if failed else ""),
+            f"varied: {shortened([q.name for q in self.quantities])}",
+            f"responses: {shortened([str(name) for name in self.data['response'].values])}",
+            f"end times: {times.size}, {times[0]:g} to {times[-1]:g} s",
+        ]
+        return "\n  ".join(lines)
+
+    def _repr_html_(self) -> str:
+        return html_of(repr(self))
 
 
 def run_parameter_study(

@@ -7,6 +7,7 @@ from html import escape
 from typing import Any
 
 NAMES = 8  # of a list
+ROWS = 30  # of an object that says one a line
 LONGEST = 240  # characters of a text
 
 
@@ -38,6 +39,17 @@ def html_page(
         told = {name: str(value) for name, value in list(attributes.items())[:40]}
         parts.append(f"<details><summary>computed from</summary>{_facts(told)}</details>")
     return "".join([*parts, "</div>"])
+
+
+def html_of(text: str) -> str:
+    """Return what an object says of itself at a prompt as HTML: its first line as heading, of 'what: fact' a row."""
+    heading, *lines = text.splitlines()
+    rows = "".join(
+        f"<tr><th>{_text(what)}</th><td>{_text(fact)}</td></tr>"
+        for what, _, fact in (line.strip().partition(": ") for line in lines[:ROWS])
+    )
+    more = f"<p>and {len(lines) - ROWS} more</p>" if len(lines) > ROWS else ""
+    return f"<div><strong>{_text(heading)}</strong><table>{rows}</table>{more}</div>"
 
 
 def _facts(facts: Mapping[str, str]) -> str:

@@ -23,6 +23,7 @@ from ...model.vehicle.loads import SIDES
 from ...model.vehicle.planes import PLANES, paired
 from ..present.files import prepare_folder, write_text
 from ..present.netcdf import RULE, one_unit_a_variable, with_conventions, write_netcdf
+from ..present.notebook import html_of
 from .norm import NormOfNormal
 from .percentiles import checked_probabilities
 
@@ -372,3 +373,6 @@ class Resultants:
         return "\n  ".join(
             [f"Resultants of {self.dataset.attrs.get('system', 'a system')}, passed with {chance:.3g}", *rows]
         )
+
+    def _repr_html_(self) -> str:
+        return html_of(repr(self))

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ....model.errors import AscentwindError
 from ....model.wind.shaping_filter import ShapingFilter
 from ....model.wind.statistics import WindStatistics
+from ...present.notebook import html_of
 from ..fitting.frozen_poles import largest_pole
 from ..fitting.intervals import share_inside
 
@@ -20,7 +21,7 @@ class SynthesisError(AscentwindError):
     """A filter cannot be synthesised from these statistics by this method."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class SynthesisResult:
     """A filter and how well it meets the statistics it was made for.
 
@@ -43,12 +44,12 @@ class SynthesisResult:
     method: str
     statistics: WindStatistics
     shaping_filter: ShapingFilter
-    covariance: NDArray[np.float64] = field(repr=False)
+    covariance: NDArray[np.float64]
     converged: bool
     message: str = ""
     evaluations: int = 0
     seconds: float = 0.0
-    coefficients: Mapping[str, tuple[NDArray, NDArray]] = field(default_factory=dict, repr=False)
+    coefficients: Mapping[str, tuple[NDArray, NDArray]] = field(default_factory=dict)
 
     @property
     def error(self) -> NDArray[np.float64]:
@@ -79,3 +80,16 @@ class SynthesisResult:
         """Return the share of the distinct covariances inside the confidence interval of the data."""
         s = self.statistics
         return share_inside(self.covariance, s.covariance, s.independent_samples, confidence)
+
+    def __repr__(self) -> str:
+        made = self.shaping_filter
+        lines = [
+            f"SynthesisResult of {self.statistics.name} by {self.method}, {'' if self.converged else 'not '}converged",
+            f"filter: order {made.order}, {made.noise_count} noises, {made.altitude[0]:g} to {made.altitude[-1]:g} m",
+            f"rms error of the covariances: {self.rms_error:.4g} m2/s2",
+            f"inside the 90 % interval of the data: {100 * self.share_inside():.1f} %",
+        ]
+        return "\n  ".join(lines + ([f"message: {self.message}"] if self.message else []))
+
+    def _repr_html_(self) -> str:
+        return html_of(repr(self))
