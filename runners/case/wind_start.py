@@ -40,6 +40,6 @@ def covariance_at(shaping_filter: ShapingFilter, altitude: float) -> NDArray[np.
     edges = [bottom, *(k for k in shaping_filter.kinks if bottom < k < altitude), altitude]
     P, budgeted = start.ravel(), at_most(rate, MOST_STEPS, "an altitude of {:.4g} m of the wind filter")
     for low, high in pairwise(edges):
-        P = solve_ivp(budgeted, (low, high), P, method="DOP853", rtol=1e-10, atol=1e-12).y[:, -1]
+        P = solve_ivp(budgeted, (low, high), P, method="DOP853", rtol=1e-12, atol=1e-14).y[:, -1]
     P = P.reshape(n, n)
     return 0.5 * (P + P.T)
