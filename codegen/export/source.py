@@ -16,6 +16,7 @@ from ...model.system.linear_system import LinearSystem
 from ..sweep.source import sweep_functions, sweep_source
 from ..system.executable import ExecutableSystem
 from ..system.functions import MATRICES
+from ..system.table_layout import table_layout
 from ..toolchain.c_printer import c_function, enumerators
 from ..toolchain.templates import render
 
@@ -341,7 +342,7 @@ def _arithmetic(executable: ExecutableSystem) -> dict[str, object]:
             c_function("other_matrices_core", core.other_matrices, ("t", "v", "p"), MATRICES[1:], names),
         ],
         "enumerators": [e for e in (names["v"], names["p"]) if e],
-        "groups": _table_groups(system),
+        "groups": table_layout(system),
         "table_values": system.v.numel(),
         "matrices": [
             {
@@ -352,22 +353,3 @@ def _arithmetic(executable: ExecutableSystem) -> dict[str, object]:
             for name, pattern in zip(MATRICES, patterns, strict=True)
         ],
     }
-
-
-def _table_groups(system: LinearSystem) -> list[dict[str, object]]:
-    groups, first, offset = [], 0, 0
-    position = {name: i for i, name in enumerate(name for g in system.tables for name in g.names)}
-    for group in system.tables:
-        groups.append(
-            {
-                "name": group.name,
-                "argument_c": "t" if group.argument == "time" else f"v[{position[group.argument]}]",
-                "names": group.names,
-                "knots": group.knots.size,
-                "first": first,
-                "offset": offset,
-            }
-        )
-        first += len(group.names)
-        offset += group.size
-    return groups

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from ...model.system.linear_system import LinearSystem
+from ..system.table_layout import table_layout
 from ..toolchain.c_printer import c_function, c_statements, enumerators
 from ..toolchain.fingerprint import fingerprint
 from ..toolchain.templates import render
@@ -73,7 +74,7 @@ def sweep_source(system: LinearSystem, functions: SweepFunctions, formula: Runge
         title=f"{system.name}: all end times in one pass",
         structure=system.structure,
         system=system,
-        groups=_groups(system),
+        groups=table_layout(system, "v[{}][j]"),
         table_values=system.v.numel(),
         enumerators=[e for e in (names["v"], names["p"]) if e],
         lanes=LANES,
@@ -128,25 +129,6 @@ def _kind(kind: Kind, A: ca.Sparsity, noises: list[list[tuple[int, int]]], known
         "noises": [(n, column) for n, column in enumerate(within) if column],
         "known": [(n, at[i]) for n, i in enumerate(known) if i in at],
     }
-
-
-def _groups(system: LinearSystem) -> list[dict[str, object]]:
-    position = {name: i for i, name in enumerate(name for g in system.tables for name in g.names)}
-    groups, first, offset = [], 0, 0
-    for group in system.tables:
-        groups.append(
-            {
-                "name": group.name,
-                "argument": "t" if group.argument == "time" else f"v[{position[group.argument]}][j]",
-                "knots": group.knots.size,
-                "tables": len(group.names),
-                "first": first,
-                "offset": offset,
-            }
-        )
-        first += len(group.names)
-        offset += group.size
-    return groups
 
 
 def _entries(sparsity: ca.Sparsity, by_row: bool) -> list[list[tuple[int, int]]]:

@@ -13,6 +13,7 @@ from ..toolchain.c_printer import c_function, enumerators
 from ..toolchain.fingerprint import fingerprint
 from ..toolchain.templates import render
 from .functions import INPUTS, INTERVAL, MATRICES, OUTPUTS, CoreFunctions, state_scales
+from .table_layout import table_layout
 
 
 class _Patterns:
@@ -40,23 +41,6 @@ def c_source(system: LinearSystem, core: CoreFunctions) -> str:
     """
     patterns = _Patterns()
     dense = {n: patterns.add(ca.Sparsity.dense(n, 1)) for n in {0, 1, system.p.numel()}}
-    groups, first, offset = [], 0, 0
-    position = {name: i for i, name in enumerate(name for g in system.tables for name in g.names)}
-    for group in system.tables:
-        groups.append(
-            {
-                "name": group.name,
-                "argument": group.argument,
-                "argument_c": "t" if group.argument == "time" else f"v[{position[group.argument]}]",
-                "names": group.names,
-                "units": group.units,
-                "knots": group.knots.size,
-                "first": first,
-                "offset": offset,
-            }
-        )
-        first += len(group.names)
-        offset += group.size
     names = {
         "v": enumerators("V", [name for g in system.tables for name in g.names]),
         "p": enumerators("P", system.parameter_names),
@@ -105,7 +89,7 @@ def c_source(system: LinearSystem, core: CoreFunctions) -> str:
         noises=system.noises,
         outputs=system.outputs,
         parameters=system.parameters,
-        groups=groups,
+        groups=table_layout(system),
         table_values=system.v.numel(),
         interval=INTERVAL,
         table_names=names["v"],
