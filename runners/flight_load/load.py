@@ -441,8 +441,8 @@ class FlightLoad:
         assert not isinstance(process, ManyOutputs)
         return reaching(process, self.levels[which], self._random(stream, which), draws)
 
-    def _movement(self, which: int, stream: int, draws: int) -> Movement:
-        part, paths = self.parts[which], self._reaching(which, stream, draws)
+    def _movement(self, which: int, paths: Reaching) -> Movement:
+        part = self.parts[which]
         diffusion = squared_diffusion(part.chain, part.chain.output[:, part.rows])
         return movement(paths, diffusion[:: paths.outputs.stride])
 
@@ -458,7 +458,7 @@ class FlightLoad:
         -------
         Movement
         """
-        return self._movement(which, 4, MOVED)
+        return self._movement(which, self._reaching(which, 4, MOVED))
 
     def sensitivity(self, probability: float | None = None, parameters: Iterable[str] | None = None) -> xr.Dataset:
         """Return derivatives of a level by parameters.
@@ -481,8 +481,9 @@ class FlightLoad:
         ParameterValueError, UnknownNameError, StructuralParameterError
         """
         which = self.number_of(probability)
-        paths = self._reaching(which, 4, MOVED) if self.of.is_resultant else None
-        found = level_sensitivity(self.parts[which], self.levels[which], self.movement(which), paths, parameters)
+        paths = self._reaching(which, 4, MOVED)
+        moved = self._movement(which, paths)
+        found = level_sensitivity(self.parts[which], self.levels[which], moved, paths, parameters)
         return found.assign_attrs(probability=self.probabilities[which], sides=self.sides)
 
     @cached_property
@@ -495,7 +496,7 @@ class FlightLoad:
         system, share, without = self.of.case.system, [], []
         count = len(system.sources)
         for which in range(len(self.probabilities)):
-            moved = self._movement(which, 5, 2 * self.draws)
+            moved = self._movement(which, self._reaching(which, 5, 2 * self.draws))
             still = np.zeros_like(moved.mean)
             part = np.array([moved.change(still, *self.parts[which].share_of([k])) for k in range(count)])
             share.append(part / part.sum())

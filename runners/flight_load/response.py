@@ -20,7 +20,7 @@ from .window import window_chain
 
 HALVINGS = 2  # from the grid of which paths are drawn to the one on which they are seen
 STEPS = 2400  # of the window at first; AS-504 in 60 s: 0.025 s
-COARSE = 0.5  # s, between the times at which a resultant is seen where its window is worth drawing
+COARSE = 1.0  # s, between the times at which a resultant is seen where its window is worth drawing
 FINE = 0.025  # s, at most between the points at which it is seen there, at first
 LEFT_OUT = 2e-3  # of the probability, at most, that is passed only where no path is drawn
 

@@ -35,7 +35,7 @@ TOLERANCE = 1e-9  # of the sweep
 
 
 def level_sensitivity(
-    of: ResponseInWindow, level: Level, moved: Movement, paths: Reaching | None, parameters: Iterable[str] | None
+    of: ResponseInWindow, level: Level, moved: Movement, paths: Reaching, parameters: Iterable[str] | None
 ) -> xr.Dataset:
     """See :meth:`FlightLoad.sensitivity`.
 
@@ -45,13 +45,13 @@ def level_sensitivity(
     level : Level
     moved : Movement
         How the level moves with mean and covariance of the response.
-    paths : Reaching or None
-        Of a resultant: paths that just reach the level.
+    paths : Reaching
+        That just reach the level.
     parameters : iterable of str or None
     """
     known = of.case.parameters
     times, envelope = (
-        _envelope(of, level, parameters) if paths is None else _envelope_of_resultant(of, paths, parameters)
+        _envelope_of_resultant(of, paths, parameters) if of.is_resultant else _envelope(of, level, parameters)
     )
     names = [str(name) for name in envelope["parameter"].values]
     size = np.abs(envelope.values * [known[name].value for name in names])
