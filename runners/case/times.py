@@ -13,6 +13,8 @@ from ...model.files.numbers import parse_number
 from ...model.vehicle.vehicle import Vehicle
 
 MOST = 100_000
+DRAWN = 400  # times of a curve
+AFTER = 1e-6  # of the span: right of a jump
 
 
 def parse_times(text: str) -> list[float]:
@@ -70,6 +72,26 @@ def seconds(time: float) -> float:
 def spread_over(times: Sequence[float], count: int) -> list[float]:
     """Return at most ``count`` of the times, evenly spread, the first and the last among them."""
     return [times[i] for i in np.unique(np.linspace(0, len(times) - 1, count).round().astype(int))]
+
+
+def drawn_times(times: Sequence[float], stops: Iterable[float]) -> list[float]:
+    """Return times at which curves are drawn: the end times, others between them, and both sides of every stop.
+
+    Parameters
+    ----------
+    times : sequence of float
+        End times, s.
+    stops : iterable of float
+        Where coefficients jump or have a corner, s.
+    """
+    first, last = times[0], times[-1]
+    if last <= first:
+        return list(times)
+    after = AFTER * (last - first)
+    own = np.array(sorted({*times, *(t for s in stops if first < s < last - after for t in (s, s + after))}))
+    between = np.linspace(first, last, DRAWN)
+    apart = np.abs(between[:, None] - own).min(axis=1) > 0.1 * (last - first) / DRAWN
+    return np.union1d(own, between[apart]).tolist()
 
 
 def time_of_greatest_dynamic_pressure(vehicle: Vehicle) -> float:

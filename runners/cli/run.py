@@ -19,7 +19,10 @@ from .system import run_system
 from .terminal import Changes, OptionalVehicle, Turbulence, number, parse_changes, results_folder
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from ..flight_load.load import FlightLoad
+    from ..statistics.engine import Engine
     from ..statistics.peak_check import PeakCheck
     from ..statistics.peaks_of_resultants import ResultantCheck
     from ..statistics.resultants import Resultants
@@ -87,7 +90,7 @@ def run(
     from ..statistics.peak_check import weighting_at, with_peak_check
     from ..statistics.peaks_of_resultants import with_resultant_check
     from ..statistics.percentiles import checked_probabilities
-    from ..statistics.response_figures import weighting_figure
+    from ..statistics.response_figures import response_figure, weighting_figure
     from ..statistics.resultants import has_resultants
     from ..views.along_vehicle_files import prepare_along_vehicle, write_along_vehicle
     from ..views.azimuth_sweep import check_turns, checked_azimuths
@@ -155,9 +158,11 @@ def run(
     with steps("figures", len(study.system.outputs) + len(families) + 1) as bar:
         if both is not None:
             job.written += _resultant_figures(both, flown.title, job.folder)
+        drawn = _drawn(study, end_times, chosen)
         for output in study.system.outputs:
             title = f"{flown.title}\n{words(output.name).capitalize()}, mean and {LABEL}"
-            job.written += write_figure(statistics.plot(output.name, title), job.folder, output.name)
+            figure = response_figure(statistics.dataset, output.name, title, drawn)
+            job.written += write_figure(figure, job.folder, output.name)
             bar.done()
         weighting = []
         for t in families:
@@ -218,6 +223,17 @@ def run(
         write_report(job.folder)
     if not agree:
         raise typer.Exit(1)
+
+
+def _drawn(study: Study, end_times: list[float], engine: Engine) -> xr.Dataset | None:
+    """Return the statistics at more times, where the engine takes them all in one pass; None elsewhere."""
+    from ..case.times import drawn_times
+    from ..statistics.sweep import Sweep
+
+    if not isinstance(engine, Sweep):
+        return None
+    times = drawn_times(end_times, study.executable.stops(end_times[-1]).times)
+    return study.response_statistics(times, engine=engine).dataset
 
 
 def _compute_for_report(study: Study, loads: list[FlightLoad], job: Job) -> None:

@@ -188,7 +188,7 @@ def _weighting(data: xr.Dataset, peak: Peak) -> Figure | None:
         f"What an impulse of {source} at an earlier time does to the {name} at {peak.time:g} s, the adjoint's answer.",
         ("time of the impulse (s)", time[late]),
         [(Key(f"g(t₂, t), {source} to {name}", "wind"), factor * values[late])],
-        f"g(t₂, t) in {unit} / ({given} · s)",
+        f"g(t₂, t) in {unit} / (({given}) · s)",
     )
 
 

@@ -11,17 +11,26 @@ from matplotlib.figure import Figure
 
 from ...model.system.names import COMBINED
 from ..present.style import COLORS, STYLE, display, words, wrapped
-from .larger_side import LABEL, SIGMAS, sign
+from .larger_side import LABEL, SIGMAS, side, sign
 from .peaks import peaks
 
 
-def response_figure(statistics: xr.Dataset, response: str, title: str) -> Figure:
-    """Return the mean, and the side of the peak of |mean| + 3 sigma from the first source and from all, over time."""
-    part = statistics.sel(response=response)
+def response_figure(statistics: xr.Dataset, response: str, title: str, drawn: xr.Dataset | None = None) -> Figure:
+    """Return the mean, both sides mean ± 3 sigma from all sources, and that of the peak from the first one, over time.
+
+    Parameters
+    ----------
+    statistics : xarray.Dataset
+        Whose peak is named.
+    response, title : str
+    drawn : xarray.Dataset, optional
+        The same at more times, for curves that are not jagged.
+    """
+    part = (statistics if drawn is None else drawn).sel(response=response)
     (peak,) = peaks(statistics.sel(response=[response]))
     factor, unit = display(peak.unit, peak.value)
     first = str(statistics["source"].values[0])
-    time = statistics["time"].values
+    time = part["time"].values
     toward = part["mean"] + sign(peak.mean) * SIGMAS * part["std"]
     with rc_context(STYLE):
         figure = Figure(layout="constrained")
@@ -35,10 +44,13 @@ def response_figure(statistics: xr.Dataset, response: str, title: str) -> Figure
         mean, sigma = part["mean"].sel(source=COMBINED), part["std"].sel(source=COMBINED)
         axes.fill_between(
             time, factor * (mean - 3 * sigma), factor * (mean + 3 * sigma),
-            color=COLORS[COMBINED], alpha=0.08, lw=0, label="mean ± 3σ, all sources",
+            color=COLORS[COMBINED], alpha=0.08, lw=0,
         )  # fmt: skip
         for color, values, label, line in curves:
             axes.plot(time, factor * values, line, color=COLORS[color], label=label, lw=2, marker=marker)
+        other = mean - sign(peak.mean) * SIGMAS * sigma
+        label = f"{side(-sign(peak.mean))}, all sources"
+        axes.plot(time, factor * other, ":", color=COLORS[COMBINED], label=label, lw=1.4, marker=marker)
         late = peak.time > 0.4 * time[0] + 0.6 * time[-1]  # the note stands on the side that has room
         axes.annotate(
             f"{LABEL}: {factor * peak.value:.3g} {unit} at {peak.time:g} s",
@@ -48,8 +60,9 @@ def response_figure(statistics: xr.Dataset, response: str, title: str) -> Figure
             ha="right" if late else "left",
             color=COLORS[COMBINED],
         )
-        axes.axhline(0, color="black", lw=0.6)
         axes.margins(y=0.12)
+        if min(axes.get_ylim()) < 0 < max(axes.get_ylim()):
+            axes.axhline(0, color="black", lw=0.6)
         axes.set(xlabel="flight time (s)", ylabel=f"{words(response)} ({unit})", title=wrapped(title))
         axes.legend()
     return figure
@@ -70,7 +83,7 @@ def weighting_figure(families: Sequence[xr.Dataset], response: str, unit: str, t
             axes.text(0.01, 0.86, f"t₂ = {family.attrs['t2_s']:g} s", transform=axes.transAxes, weight="bold")
         panels[0, 0].set(xlim=(first, latest + 1))
         panels[-1, 0].set(xlabel="time of the wind impulse t (s)")
-        figure.supylabel(f"g(t₂, t): {words(response)} at t₂ ({shown} per m/s · s)")
+        figure.supylabel(f"g(t₂, t): {words(response)} at t₂ in {shown} / ((m/s) · s)")
         figure.suptitle(wrapped(title))
     return figure
 
