@@ -12,6 +12,8 @@ from ..case.times import parse_times, seconds
 from ..solvers.markov_chain import MarkovChain
 from ..solvers.time_nodes import time_nodes
 
+MOST_KEPT = 4  # chains of a case: of both planes one is some 400 MB
+
 
 def checked_window(case: Case, window: tuple[float, float] | None) -> tuple[float, float]:
     """Return a window of flight, s: the vehicle's default times without one, the whole flight of other systems.
@@ -41,15 +43,20 @@ def checked_window(case: Case, window: tuple[float, float] | None) -> tuple[floa
 def window_chain(
     case: Case, window: tuple[float, float], steps: int, relative_tolerance: float = TOLERANCE
 ) -> MarkovChain:
-    """Return the states of a case as a chain over a window cut into equal steps; kept with the case.
+    """Return the states of a case as a chain over a window cut into equal steps; the last few are kept with the case.
 
     Raises
     ------
     IntegrationError, DataError
     """
     times = np.linspace(*window, steps + 1)
-    question = ("chain", window, steps, relative_tolerance)
-    return case.kept(question, lambda: _chain(case, times, relative_tolerance))
+    kept: dict[tuple, MarkovChain] = case.kept("chains over windows", dict)
+    question = window, steps, relative_tolerance
+    found = kept.pop(question, None) or _chain(case, times, relative_tolerance)
+    kept[question] = found
+    while len(kept) > MOST_KEPT:
+        kept.pop(next(iter(kept)), None)  # asked for longest ago
+    return found
 
 
 def _chain(case: Case, times: NDArray[np.float64], relative_tolerance: float) -> MarkovChain:

@@ -15,6 +15,7 @@ import ascentwind as aw
 from ascentwind import Limits
 from ascentwind.model import define_system
 from ascentwind.model.errors import ParameterValueError, PlanesError, UnknownNameError
+from ascentwind.runners.flight_load.window import MOST_KEPT, window_chain
 
 END = 2.0
 NAME, WINDOW = "resultant_load", (0.01, END)
@@ -159,3 +160,15 @@ def test_refused(load):
     for level in (np.nan, np.inf, "a"):
         with pytest.raises(ParameterValueError, match="finite"):
             load.probability(level)
+
+
+def test_chains_are_kept_but_not_without_end():
+    """The same question is answered once; of many questions the last few are kept."""
+    study = brownian()
+    first = window_chain(study, WINDOW, 8)
+    assert window_chain(study, WINDOW, 8) is first
+    others = [window_chain(study, WINDOW, steps) for steps in range(9, 9 + MOST_KEPT - 1)]
+    assert window_chain(study, WINDOW, 8) is first
+    assert window_chain(study, WINDOW, 40) is not None
+    assert window_chain(study, WINDOW, 8) is first
+    assert window_chain(study, WINDOW, 9) is not others[0]
