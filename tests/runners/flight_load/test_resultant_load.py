@@ -15,6 +15,8 @@ import ascentwind as aw
 from ascentwind import Limits
 from ascentwind.model import define_system
 from ascentwind.model.errors import ParameterValueError, PlanesError, UnknownNameError
+from ascentwind.runners.flight_load.norms import Norms
+from ascentwind.runners.flight_load.passage import LimitedLoad, Passage
 from ascentwind.runners.flight_load.window import MOST_KEPT, window_chain
 
 END = 2.0
@@ -172,3 +174,23 @@ def test_chains_are_kept_but_not_without_end():
     assert window_chain(study, WINDOW, 40) is not None
     assert window_chain(study, WINDOW, 8) is first
     assert window_chain(study, WINDOW, 9) is not others[0]
+
+
+@pytest.mark.slow
+def test_many_resultants_that_are_one_pass_together():
+    """A pair, itself turned, and half of itself under one limit: passed as often as the first alone."""
+    study, level = brownian(), 5.0
+    chain = window_chain(study, WINDOW, 400)
+    C, mean = chain.output[:, [0, 1, 1, 0, 0, 1]], chain.mean[:, [0, 1, 1, 0, 0, 1]]
+    C[:, 4:] *= 0.5
+    process = Norms.many(chain, C, mean)
+    loads = tuple(LimitedLoad(name, "N m", resultant=True) for name in ("own", "turned", "half"))
+    limit = np.full((chain.times.size, 3), level)
+    found = Passage(study, loads, process, limit, "both", 1e-3, 3000, 1)
+    expected = leaves_circle(level, END)
+    p = found.probability
+    assert abs(p.value - expected) < 3.5 * p.standard_error + 0.03 * expected
+    np.testing.assert_allclose(found.by_load.values[:2], p.value, rtol=1e-9)
+    assert found.by_load.values[2] < 1e-3 * expected  # twice the limit: some 1e-11
+    assert found.factor.value == pytest.approx(5.49 / level, rel=0.02)  # the level of 1e-3
+    assert found.level.shape == (chain.times.size, 3)
