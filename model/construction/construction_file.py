@@ -69,8 +69,8 @@ def load_construction(folder: Path, changes: Mapping[str, Any] | None = None) ->
         An engine draws from a tank that is not there.
     """
     toml = file_inside(folder, CONSTRUCTION_FILE)
-    entry = read_toml(toml, ConstructionFile, changes)
     collector = DataErrorCollector()
+    entry = read_toml(toml, ConstructionFile, changes, collector)
     take = collector.take
 
     def at(file: FileEntry) -> Path:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import tomllib
 import unicodedata
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from copy import deepcopy
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar, get_args, get_origin
@@ -54,7 +55,12 @@ class Section(BaseModel):
 File = TypeVar("File", bound=Section)
 
 
-def read_toml(file: Path, model: type[File], changes: Mapping[str, Any] | None = None) -> File:
+def read_toml(
+    file: Path,
+    model: type[File],
+    changes: Mapping[str, Any] | None = None,
+    collector: DataErrorCollector | None = None,
+) -> File:
     """Read and check a TOML file.
 
     Parameters
@@ -64,6 +70,9 @@ def read_toml(file: Path, model: type[File], changes: Mapping[str, Any] | None =
         Its pydantic model.
     changes : mapping, optional
         Values to put in the place of the file's, by dotted key; items of a list count from 0.
+    collector : DataErrorCollector, optional
+        Keeps what is wrong with keys, where the file without them, misspelt ones by the names that they mean, still
+        says enough for the other files to be looked at; then this is what is returned.
 
     Raises
     ------
@@ -80,7 +89,15 @@ def read_toml(file: Path, model: type[File], changes: Mapping[str, Any] | None =
         raise DataError("nests lists or tables too deep; the deepest here has a handful of levels", file=file) from None
     for dotted, value in (changes or {}).items():
         _put(data, dotted, _own(value), file)
-    return validated(data, model, file)
+    try:
+        return validated(data, model, file)
+    except DataError as error:
+        mended = None if collector is None else _mended(data, model)
+        if collector is None or mended is None:
+            raise
+        with collector.part():
+            raise error
+        return mended
 
 
 def validated(data: Mapping[str, Any], model: type[File], file: Path | None = None) -> File:
@@ -100,6 +117,40 @@ def validated(data: Mapping[str, Any], model: type[File], file: Path | None = No
     collector.errors = [_data_error(e, model, file) for e in found]
     collector.raise_all()
     raise AssertionError("an invalid file without an error")
+
+
+def _mended(data: Mapping[str, Any], model: type[File]) -> File | None:
+    """Return a file without the keys at fault, misspelt ones by the missing names they mean; None if that fails."""
+    try:
+        mended = deepcopy(dict(data))
+        try:
+            return model.model_validate(_plain(mended))
+        except ValidationError as error:
+            errors = error.errors()
+        for e in errors:
+            *path, last = e["loc"]
+            while path and not isinstance(last, str):  # an item of a list goes with all of them
+                last = path.pop()
+            inner = _inside(mended, path)
+            if e["type"] == "missing" or not isinstance(inner, dict) or last not in inner:
+                continue
+            value = inner.pop(last)
+            if e["type"] == "extra_forbidden":
+                missing = [str(m["loc"][-1]) for m in errors if m["type"] == "missing" and [*m["loc"][:-1]] == path]
+                inner |= dict.fromkeys(get_close_matches(str(last), missing, n=1, cutoff=0.5), value)
+        return model.model_validate(_plain(mended))
+    except (ValidationError, RecursionError):
+        return None
+
+
+def _inside(data: Any, path: Sequence[int | str]) -> Any:
+    """Return what stands at a path, None where nothing does."""
+    for part in path:
+        if (isinstance(data, dict) and part in data) or (isinstance(data, list) and part in range(len(data))):
+            data = data[part]
+        else:
+            return None
+    return data
 
 
 def _told_once(errors: list[ErrorDetails]) -> list[ErrorDetails]:

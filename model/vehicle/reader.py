@@ -108,11 +108,13 @@ def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehi
     toml = folder / VEHICLE_FILE
     if not toml.is_file():
         raise DataError(f"holds no {VEHICLE_FILE}; start from 'ascentwind new-vehicle DIR --from as504'", file=folder)
-    file = read_vehicle_file(file_inside(folder, VEHICLE_FILE), changes)
-    _refuse_unused(changes or {}, file, toml)
+    collector = DataErrorCollector()
+    file = read_vehicle_file(file_inside(folder, VEHICLE_FILE), changes, collector)
+    with collector.part():
+        _refuse_unused(changes or {}, file, toml)
     if FORMER_Q_ALPHA in file.options.extra_outputs:
         warn_deprecated(f"the extra output {FORMER_Q_ALPHA}", "q_alpha, which every vehicle has")
-    reader = _Reader(folder, toml, file)
+    reader = _Reader(folder, toml, file, collector)
     if file.planes != "yaw" and file.options.mean_response == "nonlinear":
         why = f'is of the yaw plane, and planes = "{file.planes}"; set it to "linear"'
         reader.collector.errors.append(DataError(why, file=toml, column="options.mean_response"))
@@ -368,13 +370,13 @@ def _add_local(reader: _Reader, file: VehicleFile, scope: str, wanted: frozenset
 class _Reader:
     """Collects tables, their sources and the times at which they jump."""
 
-    def __init__(self, folder: Path, toml: Path, file: VehicleFile):
+    def __init__(self, folder: Path, toml: Path, file: VehicleFile, collector: DataErrorCollector):
         self.folder, self.toml, self.events, self.start = folder, toml, file.events, file.start_time_s
         self.file = file
         self.tables: dict[str, Table] = {}
         self.sources: list[TableSource] = []
         self.discontinuities: set[float] = set()
-        self.collector = DataErrorCollector()
+        self.collector = collector
         self.schedules: dict[str, tuple[Table, Path]] = {}
 
     def refuse(self, why: str, key: str) -> None:

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
+from ..errors import DataErrorCollector
 from ..files.folder_files import FileName
 from ..files.toml_file import Name, NotNegative, Positive, Section, Whole, read_toml
 from ..wind.turbulence import HIGH_PASS, LENGTH
@@ -381,7 +382,9 @@ class VehicleFile(Section):
     options: Annotated[OptionsEntry, STRUCTURE] = OptionsEntry()
 
 
-def read_vehicle_file(file: Path, changes: Mapping[str, Any] | None = None) -> VehicleFile:
+def read_vehicle_file(
+    file: Path, changes: Mapping[str, Any] | None = None, collector: DataErrorCollector | None = None
+) -> VehicleFile:
     """Read and check a vehicle's TOML file.
 
     Parameters
@@ -390,10 +393,12 @@ def read_vehicle_file(file: Path, changes: Mapping[str, Any] | None = None) -> V
     changes : mapping, optional
         Values to put in the place of the file's, by dotted key: ``{"options.full_coupling": True}``. Items of a list
         count from 0 (``bending.0.damping``).
+    collector : DataErrorCollector, optional
+        As of :func:`read_toml`.
 
     Raises
     ------
     DataError
         The file, the key in it, what is wrong and the nearest valid key.
     """
-    return read_toml(file, VehicleFile, changes)
+    return read_toml(file, VehicleFile, changes, collector)

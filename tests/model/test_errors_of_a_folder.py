@@ -172,3 +172,45 @@ def test_missing_tables_and_other_times_of_a_system_are_told_together(tmp_path):
     with pytest.raises(SeveralDataErrors) as found:
         read_arrays(tmp_path)
     assert told(found.value) == {"B.csv": 1, "C.csv": 1, "D.csv": 1}
+
+
+def test_keys_at_fault_hide_no_table(tmp_path):
+    """A misspelt key, one of the wrong type, and a table beside them."""
+    folder = copied(tmp_path, "as504")
+    toml = folder / "vehicle.toml"
+    text = toml.read_text()
+    for old, new in (("start_time_s = 10.0", "strt_time_s = 10.0"), ("full_coupling = false", 'full_coupling = "no"')):
+        assert old in text
+        text = text.replace(old, new, 1)
+    toml.write_text(text)
+    spoiled(folder / "rigid_body.csv")
+    spoiled(folder / "propulsion.csv")
+    with pytest.raises(SeveralDataErrors) as found:
+        load_vehicle(folder)
+    assert told(found.value) == {"vehicle.toml": 2, "rigid_body.csv": 1, "propulsion.csv": 1}
+    assert "did you mean 'start_time_s'" in str(found.value)
+
+
+def test_keys_at_fault_hide_no_table_of_a_construction(tmp_path):
+    folder = copied(tmp_path, "as504")
+    toml = folder / CONSTRUCTION_FILE
+    text = toml.read_text().replace("sensor_station_m", "sensr_station_m", 1)
+    toml.write_text(text.replace("load_stations_m = [25.0]", 'load_stations_m = ["aft"]', 1))
+    spoiled(folder / "construction" / "drag.csv")
+    with pytest.raises(SeveralDataErrors) as found:
+        load_construction(folder)
+    assert told(found.value) == {CONSTRUCTION_FILE: 2, "drag.csv": 1}
+
+
+def test_a_key_alone_at_fault_is_told_alone(tmp_path):
+    """What is loaded without it brings no error of its own, and no vehicle."""
+    folder = copied(tmp_path, "falcon1")
+    toml = folder / "vehicle.toml"
+    toml.write_text(toml.read_text().replace("start_time_s", "strt_time_s", 1))
+    with pytest.raises(DataError, match="did you mean 'start_time_s'") as found:
+        load_vehicle(folder)
+    assert not isinstance(found.value, SeveralDataErrors)
+    toml.write_text(toml.read_text().replace("[tables.rigid_body]", "[tables.rigd_body]", 1))
+    with pytest.raises(DataError) as found:
+        load_vehicle(folder)
+    assert told(found.value) == {"vehicle.toml": 2}
