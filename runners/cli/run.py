@@ -158,7 +158,7 @@ def run(
     with steps("figures", len(study.system.outputs) + len(families) + 1) as bar:
         if both is not None:
             job.written += _resultant_figures(both, flown.title, job.folder)
-        drawn = _drawn(study, end_times, chosen)
+        drawn = _drawn(study, statistics, end_times, chosen)
         for output in study.system.outputs:
             title = f"{flown.title}\n{words(output.name).capitalize()}, mean and {LABEL}"
             figure = response_figure(statistics.dataset, output.name, title, drawn)
@@ -225,12 +225,14 @@ def run(
         raise typer.Exit(1)
 
 
-def _drawn(study: Study, end_times: list[float], engine: Engine) -> xr.Dataset | None:
+def _drawn(
+    study: Study, statistics: ResponseStatistics, end_times: list[float], engine: Engine | None
+) -> xr.Dataset | None:
     """Return the statistics at more times, where the engine takes them all in one pass; None elsewhere."""
     from ..case.times import drawn_times
     from ..statistics.sweep import Sweep
 
-    if not isinstance(engine, Sweep):
+    if statistics.attrs["engine"] != Sweep.name:
         return None
     times = drawn_times(end_times, study.executable.stops(end_times[-1]).times)
     return study.response_statistics(times, engine=engine).dataset

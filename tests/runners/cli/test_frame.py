@@ -125,3 +125,15 @@ def test_hints_leave_what_is_piped_alone(ascentwind):
 def test_every_option_says_what_it_is():
     silent = [f"{name} {p.name}" for name, c in COMMANDS.items() for p in c.params if hasattr(p, "help") and not p.help]
     assert silent == []
+
+
+@pytest.mark.parametrize(("engine", "fine"), [(None, True), ("sweep", True), ("covariance", False)])
+def test_figures_of_a_run_are_drawn_finely_where_that_costs_nothing(cache, engine, fine):
+    from lag import lag
+
+    from ascentwind.runners.cli.run import _drawn
+
+    study = lag()
+    statistics = study.response_statistics([1.0, 4.0], engine=engine)
+    drawn = _drawn(study, statistics, [1.0, 4.0], None)
+    assert (drawn is not None and drawn.sizes["time"] > 100) == fine
