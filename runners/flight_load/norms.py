@@ -28,6 +28,7 @@ DIRECTIONS = 24
 ANGLES = 2.0 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
 LINES = np.stack([np.cos(ANGLES), np.sin(ANGLES)], axis=1)
 ENCLOSING = np.cos(np.pi / DIRECTIONS)  # distance of lines that enclose a circle of radius one
+TOGETHER = 512  # norms whose law is computed at a time, each by some 1600 points of its circle
 MATTERS = 1e-6  # of the largest probability of an instant: smaller ones are taken from half-planes
 
 
@@ -107,9 +108,13 @@ class Norms:
         """
         found = self._by_lines(boundary.upper, LINES).max(axis=0)
         matter = found >= found.max() + np.log(MATTERS)
-        law = NormOfNormal(self.law.mean[matter], self.law.covariance[matter])
+        mean, covariance, level = self.law.mean[matter], self.law.covariance[matter], boundary.upper[matter]
+        exact = np.empty(level.size)
+        for first in range(0, level.size, TOGETHER):
+            part = slice(first, first + TOGETHER)
+            exact[part] = NormOfNormal(mean[part], covariance[part]).exceedance(level[part])
         with np.errstate(divide="ignore"):
-            found[matter] = np.log(law.exceedance(boundary.upper[matter]))
+            found[matter] = np.log(exact)
         return np.stack([found, np.full(found.shape, -np.inf)])
 
     def largest_instant(self, boundary: Boundary) -> float:
