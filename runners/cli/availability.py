@@ -20,12 +20,15 @@ if TYPE_CHECKING:
 
 TOP = 30000.0  # m
 FEW = 3  # azimuths, whose intervals are printed
+MOST_ROSES = 6  # of the largest loads
 
 
 def availability(
     context: typer.Context,
     vehicle: VehicleArgument,
-    limit: Annotated[Path, typer.Option(help="CSV: 'time [s]', then limits such as 'bending_moment [N m]'.")],
+    limit: Annotated[
+        Path, typer.Option(help="CSV: 'time [s]' and/or 'station [m]', then limits such as 'bending_moment [N m]'.")
+    ],
     months: Annotated[str, typer.Option(help="By name or number, commas between, or all.")] = "all",
     azimuths: Annotated[
         str | None, typer.Option(help="START:STOP:STEP or A1,A2,... in deg; the vehicle's own without it.")
@@ -77,7 +80,14 @@ def availability(
             threshold=threshold, sides=chosen, draws=draws, seed=seed,
         )  # fmt: skip
     job.replace_earlier("availability", study)
-    kept = ["probability", "lower", "upper", *(["stopped", "remaining_risk"] if check_hours is not None else [])]
+    kept = [
+        "probability",
+        "lower",
+        "upper",
+        "standard_error",
+        "spacing_error",
+        *(["stopped", "remaining_risk"] if check_hours is not None else []),
+    ]
     rows = [",".join(["month", "azimuth_deg", *kept])]
     for month in found["month"].values:
         for angle in found["azimuth"].values:
@@ -91,13 +101,13 @@ def availability(
     job.written.append(write_netcdf(with_conventions(whole_file), job.folder / "availability.nc"))
     job.written.append(write_text(job.folder / "availability.csv", text))
     title = study.vehicle_for("availability").title
-    heading = f"{title}\n{found.attrs['plane'].capitalize()} plane, winds of {found.attrs['site']}"
+    planes = "both planes" if found.attrs["plane"] == "both" else f"{found.attrs['plane']} plane"
+    heading = f"{title}\n{planes.capitalize()}, winds of {found.attrs['site']}"
     job.written += write_figure(availability_figure(found, heading), job.folder, "availability")
-    for name in found["response"].values:
+    worst = found["level"].max(dim=("month", "azimuth")).values
+    for name in found["response"].values[np.argsort(-worst, kind="stable")[:MOST_ROSES]]:
         job.written += write_figure(load_rose(found, str(name), heading), job.folder, f"rose_{name}")
-    table = Table(
-        "month", title=f"Flights that pass a limit, {found.attrs['plane']} plane, winds of {found.attrs['site']}"
-    )
+    table = Table("month", title=f"Flights that pass a limit, {planes}, winds of {found.attrs['site']}")
     shown = found["azimuth"].values
     for angle in shown:
         table.add_column(f"{np.degrees(angle):.4g}°", justify="right", no_wrap=True)
@@ -115,7 +125,9 @@ def availability(
         table.add_row(str(month), *cells)
     print_table(table, console)
     console.print(
-        "The files hold, and few azimuths show, 90 % by the sampling of the wind's statistics alone: errors of "
+        f"The grid of times leaves up to {100 * float(found['spacing_error'].max()):.1f} % of a chance open, the draws "
+        f"{100 * float((found['standard_error'] / found['probability'].clip(1e-300)).max()):.0f} % (one standard "
+        "error). The files hold, and few azimuths show, 90 % by the sampling of the wind's statistics alone: errors of "
         "filters, of reconstructed correlations and of the model are not in them.",
         style="dim", soft_wrap=True,
     )  # fmt: skip

@@ -23,7 +23,9 @@ def day_of_launch(
     vehicle: VehicleArgument,
     sounding: Annotated[list[Path], typer.Option(help="File of one sounding, several times.")],
     hours_before: Annotated[list[float], typer.Option(parser=number, help="Launch, h; one for each sounding.")],
-    limit: Annotated[Path, typer.Option(help="CSV: 'time [s]', then limits such as 'bending_moment [N m]'.")],
+    limit: Annotated[
+        Path, typer.Option(help="CSV: 'time [s]' and/or 'station [m]', then limits such as 'bending_moment [N m]'.")
+    ],
     window: Annotated[
         str | None, typer.Option(help="BEGIN:END of the flight in s; the vehicle's default times without it.")
     ] = None,
@@ -69,12 +71,13 @@ def day_of_launch(
     persistence = _persistence(study, pairs, component, lasts, exponent if given(context, "exponent") else 2.0 / 3.0)
     job = Job(out or results_folder(vehicle, "day-of-launch"))
     with console.status("what the balloons say"):
-        launch = study.day_of_launch(
+        asked = study.day_of_launch(
             list(sounding), list(hours_before), limits=limits, window=flown, persistence=persistence, error=error,
             threshold=threshold, sides=chosen, draws=draws, seed=seed, component=component, sign=sign,
         )  # fmt: skip
         title = study.vehicle_for("a day of launch").title
-        page = launch_page(launch, title)
+        launch = asked.about_its_mean()
+        page = launch_page(launch, title, asked.probability)
     job.replace_earlier("day-of-launch", study)
     found = launch.to_dataset()
     units = {"response": found["unit"].values.tolist()}

@@ -109,7 +109,7 @@ def checked_limits(case: Case, limits: str | Path | Limits, window: tuple[float,
         with collector.part():
             table.of(name, _unit(case, table, name), np.array(window))
             if table.station is not None:
-                _inside(case, table, name)
+                stations_inside(case, table, name)
     collector.raise_all()
     if table.station is None:
         case.checked_responses([output for name in table.values for output in pairs.get(name, (name,))])
@@ -127,8 +127,14 @@ def _loads_along(case: Case) -> list[str]:
     return list(LOADS) if len(_planes(case)) == 1 else [BENDING_MOMENT, SHEAR_FORCE]
 
 
-def _inside(case: Case, table: Limits, name: str) -> NDArray[np.bool_]:
-    """Return which of the vehicle's stations lie within those of the table."""
+def stations_inside(case: Case, table: Limits, name: str, warn: bool = False) -> NDArray[np.bool_]:
+    """Return which of the vehicle's stations lie within those of the table; warn where some do not.
+
+    Raises
+    ------
+    LimitError
+        None does.
+    """
     found, stations = vehicle_stations(case, name), table.station
     assert stations is not None
     inside = (found >= stations[0] - SAME_STATION) & (found <= stations[-1] + SAME_STATION)
@@ -139,6 +145,12 @@ def _inside(case: Case, table: Limits, name: str) -> NDArray[np.bool_]:
             file=table.file,
             column="station",
         )
+    if warn and not inside.all():
+        text = (
+            f"the limit of {name.replace('_', ' ')} is given from station {stations[0]:g} to {stations[-1]:g} m: "
+            f"{int((~inside).sum())} of the vehicle's {inside.size} stations lie outside and are not looked at"
+        )
+        warnings.warn(UncheckedStationsWarning(text), stacklevel=5)
     return inside
 
 
@@ -160,13 +172,7 @@ def _station_rows(case: Case, table: Limits, states: MarkovChain, name: str) -> 
     found = [load_rows(case, states.times.tolist(), load=name, plane=plane) for plane in planes]
     limit, stations = table.of(name, LOADS[name], states.times), table.station
     assert stations is not None
-    inside = _inside(case, table, name)
-    if not inside.all():
-        text = (
-            f"the limit of {name.replace('_', ' ')} is given from station {stations[0]:g} to {stations[-1]:g} m: "
-            f"{int((~inside).sum())} of the vehicle's {inside.size} stations lie outside and are not looked at"
-        )
-        warnings.warn(UncheckedStationsWarning(text), stacklevel=4)
+    inside = stations_inside(case, table, name, warn=True)
     at, means = np.flatnonzero(inside), case.mean_states(states.times)
     row = np.stack([plane.state[:, at] for plane in found], axis=2)
     mean = np.einsum("mspn,mn->msp", row, means) + np.stack([plane.direct_mean[:, at] for plane in found], axis=2)

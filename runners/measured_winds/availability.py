@@ -22,38 +22,39 @@ from scipy.stats import chi2, norm
 from ...codegen.system.evaluation import MatrixEvaluator
 from ...model.errors import ParameterValueError
 from ...model.system.names import WIND
-from ...model.tables import Table
 from ...model.wind.month_winds import MonthWind, read_months
 from ...model.wind.record import COMPONENTS
 from ...model.wind.two_components import TwoComponentWind, plane_weights
 from ..case.case import Case
 from ..case.climb import Climb
 from ..case.provenance import provenance
-from ..flight_load.limit_table import LimitError, Limits, limit_table
+from ..flight_load.limit_table import Limits
 from ..flight_load.load import DESIGN
-from ..flight_load.passage import LimitedLoad, Passage
-from ..flight_load.process import Grid, JointOutputs, joint_covariance
+from ..flight_load.passage import Passage
+from ..flight_load.process import joint_covariance
 from ..flight_load.request import checked_draws
 from ..flight_load.window import checked_window, window_chain
 from ..solvers.markov_chain import MarkovChain
 from ..solvers.time_nodes import interval_before
 from ..statistics.norm import NormOfNormal
 from ..statistics.percentiles import Sides, checked_sides, instant_level
-from ..statistics.resultants import resultant_pairs
 from .conditioning import Measured
-from .day_of_launch import ERROR, worth_while
-from .level_weights import WINDS, level_weights
+from .day_of_launch import ERROR, MOST_VALUES, matter, worth_while
+from .level_weights import WINDS
+from .limited_loads import LimitedLoads, limited_loads, row_weights, symmetric
+from .other_winds import in_mean_winds
 from .random_wind import RandomWind, filter_wind
 from .wind_field import WindField, default_persistence
 
-STEPS = 1200  # of the window
+STEPS = 1200  # of the window, at most
+MOST_WEIGHTS = 1200  # loads times coarse steps
 COARSE = 8  # every so many are looked at, to see where passing is worth while
 MOST = 600  # points of time at which passing is computed
 SPACING = 25.0  # m, of the levels
 CONFIDENCE = 0.9  # of intervals by the statistics' own sampling
 BALLOON = 200.0  # m between levels of the sounding of a check
 DAYS, PATHS = 400, 1500  # drawn for a check
-CHECK_POINTS = 150  # of time, of a check
+CHECK_VALUES = 150  # times and loads, of a check
 
 
 def availability(
@@ -71,71 +72,76 @@ def availability(
 ) -> xr.Dataset:
     """See :meth:`Study.availability`."""
     checked_draws(draws, seed)
-    chosen, flown, table = checked_sides(sides), checked_window(case, window), limit_table(limits)
+    chosen, flown = checked_sides(sides), checked_window(case, window)
     if not 0 < threshold < 1:
         raise ParameterValueError(f"threshold = {threshold!r} is no probability; give one between 0 and 1")
     if check_hours is not None and not 0 <= check_hours < np.inf:
         raise ParameterValueError(f"a check {check_hours!r} h before launch; give hours of 0 or more")
-    if table.station is not None:
-        raise LimitError("is over stations of the structure; availability takes responses over time", file=table.file)
-    names = case.checked_responses(table.values)
-    units = [case.system.outputs[case.system.output_index(name)].unit for name in names]
-    for name, unit in zip(names, units, strict=True):
-        table.of(name, unit, np.array(flown))
+    loads = limited_loads(case, limits, None, flown, chosen)
     vehicle = case.vehicle_for("the availability of months")
     angles, turns = _turns(case, azimuths)
     seasons = read_months(None if winds is None else Path(winds), None if months is None else list(months))
-    pairs = resultant_pairs(names)
 
     levels = _levels(case, flown, seasons)
-    at = [case.system.output_index(name) for name in names]
-    times = window_chain(case, flown, STEPS).times
-    by_level = level_weights(case, times.tolist(), levels, names)
+    steps = COARSE * int(np.clip(MOST_WEIGHTS // len(loads.rows), 30, STEPS // COARSE))
+    season_chain = window_chain(case, flown, steps)
+    times, limit = season_chain.times, loads.values(season_chain.times)
+    by_level = case.kept(
+        ("availability", flown, loads.rows, tuple(levels.tolist())),
+        lambda: row_weights(case, loads, season_chain, levels),
+    )
     others = [k for k, source in enumerate(case.system.sources) if source != WIND]
-    limit = np.stack([table.of(n, u, times)[:, 0] for n, u in zip(names, units, strict=True)], axis=1)
     shape = (len(seasons), angles.size)
     found = {
         key: np.full(shape, np.nan) for key in ("probability", "lower", "upper", "standard_error", "spacing_error")
     }
     found |= {key: np.full(shape, np.nan) for key in ("stopped", "remaining_risk")}
-    level = np.full((*shape, len(names) + len(pairs)), np.nan)
+    levels_shown = [limit.load for limit in loads.limits]
+    level = np.full((*shape, len(levels_shown)), np.nan)
     for i, month in enumerate(seasons):
         field = WindField(_wind(month, levels))
         for j, turn in enumerate(turns):
-            chain = window_chain(_in_mean(case, month, turn), flown, STEPS)
-            weight = np.einsum("mrck,cd->mrdk", by_level.weight.reshape(times.size, len(names), len(turn), -1), turn)
-            weight = weight.reshape(times.size, len(names), -1)
-            row, coarse, bound = chain.output[::COARSE][:, at], weight[::COARSE], limit[::COARSE]
-            own_covariance = row @ chain.covariance(others)[::COARSE] @ row.swapaxes(1, 2)
-            by_wind = (coarse @ field.wind.covariance) @ coarse.swapaxes(1, 2)
-            mean = chain.mean[:, at]
-            wind, own_variance = (np.maximum(np.einsum("mrr->mr", c), 0.0) for c in (by_wind, own_covariance))
-            std = np.sqrt(wind + own_variance)
-            first, last = (COARSE * k for k in worth_while(mean[::COARSE], std, bound, chosen))
-            fine = np.arange(first, last + 1, max(1, -(-(last - first) // MOST)))
-            part = chain.part(slice(first, last + 1))
-            own = joint_covariance(part, part.output[:, at], others)[fine - first][:, :, fine - first]
-            F = weight[fine].reshape(fine.size * len(names), -1)
+            about = _in_mean(case, month, turn)
+            chain = window_chain(about, flown, steps)
+            row, direct, mean = loads.over(chain, about)
+            R = row.shape[1]
+            weight = np.einsum("mrck,cd->mrdk", by_level.weight.reshape(times.size, R, len(turn), -1), turn)
+            weight, coarse = weight.reshape(times.size, R, -1), slice(None, None, COARSE)
+            own_covariance = row[coarse] @ chain.covariance(others)[coarse] @ row[coarse].swapaxes(1, 2)
+            by_wind = (weight[coarse] @ field.wind.covariance) @ weight[coarse].swapaxes(1, 2)
+            parts = mean[coarse], symmetric(by_wind), symmetric(own_covariance)
+            chance = loads.chances(mean[coarse], parts[1] + parts[2], limit[coarse], chosen)
+            first, last = (COARSE * k for k in worth_while(chance))
+            some, rows = loads.only(matter(chance))
+            most = max(8, min(MOST, MOST_VALUES // len(rows)))
+            fine = np.arange(first, last + 1, max(1, -(-(last - first) // most)))
+            within = chain.part(slice(first, last + 1))
+            own = joint_covariance(within, row[first : last + 1][:, rows], others)[fine - first][:, :, fine - first]
+            F = weight[fine][:, rows].reshape(fine.size * len(rows), -1)
             covariance = (F @ field.wind.covariance @ F.T).reshape(own.shape) + own
-            rough = _diffusion(case, month, turn, part, fine - first, at, others)
-            process = JointOutputs(Grid(chain.times[fine], mean[fine], rough), covariance)
-            loads = [LimitedLoad(n, u) for n, u in zip(names, units, strict=True)]
-            p = Passage(case, loads, process, limit[fine], chosen, DESIGN, draws, seed).probability
+            through = _direct(case, some, times[fine]) if direct is None else direct[fine][:, rows]
+            noise = _noise(case, month, turn, chain, fine, row[fine][:, rows], through, others)
+            process = some.process(times[fine], mean[fine][:, rows], covariance, noise)
+            shown = [limit.load for limit in some.limits]
+            p = Passage(case, shown, process, some.values(times[fine]), chosen, DESIGN, draws, seed).probability
             found["probability"][i, j], found["standard_error"][i, j] = p.value, p.standard_error
             found["spacing_error"][i, j] = p.spacing_error
-            low, high = _interval(mean[::COARSE], wind, own_variance, bound, chosen, month.independent_samples)
+            low, high = _interval(loads, parts, limit[coarse], chosen, month.independent_samples)
             found["lower"][i, j], found["upper"][i, j] = min(1.0, p.value * low), min(1.0, p.value * high)
-            level[i, j, : len(names)] = instant_level(mean[::COARSE], std, DESIGN, chosen).max(axis=0)
-            for k, pair in enumerate(pairs.values(), start=len(names)):
-                two = [names.index(name) for name in pair]
-                both = (by_wind + own_covariance)[:, two][:, :, two]
-                level[i, j, k] = NormOfNormal(mean[::COARSE][:, two], both).percentile(DESIGN).max()
+            for k, limited in enumerate(loads.limits):
+                two = list(limited.rows)
+                whole = (parts[1] + parts[2])[:, two][:, :, two]
+                if len(two) == 2:
+                    level[i, j, k] = NormOfNormal(mean[coarse][:, two], whole).percentile(DESIGN).max()
+                else:
+                    std = np.sqrt(np.maximum(whole[:, 0], 0.0))
+                    level[i, j, k] = instant_level(mean[coarse][:, two], std, DESIGN, chosen).max()
             if check_hours is not None:
-                some = fine[:: max(1, fine.size // CHECK_POINTS)]
-                which = np.searchsorted(fine, some)
+                which = np.arange(0, fine.size, max(1, fine.size * len(rows) // CHECK_VALUES))
+                at = fine[which]
                 found["stopped"][i, j], found["remaining_risk"][i, j] = _checked(
-                    field, weight[some], mean[some], covariance[which][:, :, which], limit[some], chosen, check_hours,
-                    threshold, seed,
+                    field, some, weight[at][:, rows], mean[at][:, rows], covariance[which][:, :, which],
+                    some.values(times[at]), chosen, check_hours, threshold, seed,
                 )  # fmt: skip
     meanings = {
         "probability": "of passing any limit in a flight",
@@ -160,8 +166,8 @@ def availability(
         {
             "month": [season.period for season in seasons],
             "azimuth": ("azimuth", angles, {"units": "rad", "long_name": "of the launch, from north towards east"}),
-            "response": [*names, *pairs],
-            "unit": ("response", [*units, *(units[names.index(first)] for first, _ in pairs.values())]),
+            "response": [load.label for load in levels_shown],
+            "unit": ("response", [load.unit for load in levels_shown]),
         },
         provenance(case)
         | {
@@ -215,63 +221,61 @@ def _wind(month: MonthWind, levels: NDArray[np.float64]) -> RandomWind:
 
 
 def _in_mean(case: Case, month: MonthWind, turn: NDArray[np.float64]) -> Case:
-    """Return a case whose mean winds are a month's: what deviations of the vehicle do goes with its mean response."""
-    polynomials = {}
-    for old, (wu, wv) in zip(case.vehicle_for("the availability of months").wind.means, turn, strict=True):
-        values = month.mean_along((wu, wv), old.argument)
-        polynomials[old.name] = Table(old.name, old.unit, old.argument, values, old.interpolation).polynomial
-    executable = case.executable
-    groups = tuple(group.with_polynomials(polynomials) for group in executable.groups)
-    return Case(executable.with_numbers(groups=groups), case.vehicle)
+    """Return a case whose mean winds are a month's, turned."""
+    return in_mean_winds(case, lambda number, levels: month.mean_along(tuple(turn[number]), levels))
 
 
-def _diffusion(
+def _noise(
     case: Case,
     month: MonthWind,
     turn: NDArray[np.float64],
-    part: MarkovChain,
-    picked: NDArray[np.intp],
-    rows: list[int],
+    chain: MarkovChain,
+    fine: NDArray[np.intp],
+    row: NDArray[np.float64],
+    direct: NDArray[np.float64],
     others: list[int],
 ) -> NDArray[np.float64]:
-    """Return what white noise does to outputs directly, that of the month's wind and of the vehicle, (m, r)."""
-    climb, times, joint = Climb.of(case), part.times[picked], month.joint
+    """Return what white noise does to loads directly, that of the month's wind and of the vehicle, (m, r, noises)."""
+    climb, times, joint = Climb.of(case), chain.times[fine], month.joint
     held = np.clip(climb.altitude(times), joint.altitude[0], joint.altitude[-1])
     _, G, H = joint.at(held)
     first = month.zonal.order
     by_noise = np.stack([H[:, None, :first] @ G[:, :first], H[:, None, first:] @ G[:, first:]], axis=1)[:, :, 0]
     by_noise *= np.sqrt(np.maximum(climb.polynomial(times, 1), 0.0))[:, None, None]  # of u and v, (m, 2, noises)
-    evaluate = MatrixEvaluator(case.with_means, ("G",))
     winds = [i for i, name in enumerate(case.system.input_names) if name in WINDS]
-    through = []
+    own = row @ chain.acting_noise_matrix(others)[fine]
+    return np.concatenate([direct[:, :, winds] @ turn @ by_noise, own], axis=2)
+
+
+def _direct(case: Case, loads: LimitedLoads, times: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return what known inputs do to responses directly at times (s), (m, r, n_u)."""
+    outputs, evaluate, found = [row.output for row in loads.rows], MatrixEvaluator(case.with_means, ("G",)), []
     for time in times.tolist():
         here = interval_before(case.with_means, time) if time > case.system.start else None
         low, high = (time, time) if here is None else (here.low, here.high)
-        through.append(evaluate(time, low, high)[0][np.ix_(rows, winds)] @ turn)
-    direct = part.output[picked][:, rows] @ part.acting_noise_matrix(others)[picked]
-    whole = np.concatenate([np.array(through) @ by_noise, direct], axis=2)
-    size = np.sqrt((whole**2).sum(axis=2))
-    largest = np.take_along_axis(whole, np.abs(whole).argmax(axis=2)[..., None], axis=2)[..., 0]
-    return np.copysign(size, largest)
+        found.append(evaluate(time, low, high)[0][outputs])
+    return np.array(found)
 
 
 def _interval(
-    mean: NDArray, wind: NDArray, vehicle: NDArray, limit: NDArray, sides: Sides, samples: float
+    loads: LimitedLoads,
+    parts: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
+    limit: NDArray[np.float64],
+    sides: Sides,
+    samples: float,
 ) -> tuple[float, float]:
     """Return the factors on a probability that the sampling of the wind's statistics leaves open.
 
     By the change of the sum of all instants' chances: the wind's variance is chi-square with samples - 1 degrees of
     freedom, its mean load normal with variance wind / samples; both are independent and taken together by the root sum
-    square of the logarithms.
+    square of the logarithms. ``parts`` are the mean and the covariances by wind and by the vehicle.
     """
+    mean, wind, vehicle = parts
+    error = np.sign(mean) * np.sqrt(np.maximum(np.einsum("mrr->mr", wind), 0.0) / samples)
 
     def chance(scale: float, shift: float) -> float:
-        std = np.sqrt(scale * wind + vehicle)
-        unit = np.where(std > 0, std, np.inf)
-        moved = mean + shift * np.sign(mean) * np.sqrt(wind / samples)
-        upper = norm.logsf((limit - moved) / unit) if sides != "lower" else np.full(mean.shape, -np.inf)
-        lower = norm.logsf((limit + moved) / unit) if sides != "upper" else np.full(mean.shape, -np.inf)
-        return float(np.logaddexp.reduce(np.logaddexp(upper, lower), axis=None))
+        total = loads.chances(mean + shift * error, scale * wind + vehicle, limit, sides).sum()
+        return float(np.log(max(total, np.finfo(float).tiny)))
 
     nu, tail, here = samples - 1, 0.5 * (1 - CONFIDENCE), chance(1.0, 0.0)
     z = float(norm.ppf(1 - tail))
@@ -285,6 +289,7 @@ def _interval(
 
 def _checked(
     field: WindField,
+    loads: LimitedLoads,
     weight: NDArray[np.float64],
     mean: NDArray[np.float64],
     covariance: NDArray[np.float64],
@@ -308,13 +313,8 @@ def _checked(
     root = size[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
     flights = random.standard_normal((PATHS, m * r)) @ root.T
     days = mean.ravel() + random.standard_normal((DAYS, len(rows))) @ gain
-    bound, chance = limit.ravel(), np.empty(DAYS)
+    chance = np.empty(DAYS)
     for k, day in enumerate(days):
-        beyond = np.zeros(PATHS, bool)
-        if sides != "lower":
-            beyond |= (flights > bound - day).any(axis=1)
-        if sides != "upper":
-            beyond |= (flights < -bound - day).any(axis=1)
-        chance[k] = beyond.mean()
+        chance[k] = loads.beyond(limit, (flights + day).reshape(PATHS, m, r), sides).mean()
     go = chance <= threshold
     return float(1 - go.mean()), float(chance[go].mean()) if go.any() else float("nan")

@@ -22,7 +22,6 @@ from typing import cast
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
-from scipy.stats import norm
 
 from ...model.errors import ParameterValueError, UnknownNameError
 from ...model.wind.soundings.collection import Soundings
@@ -31,10 +30,10 @@ from ...model.wind.soundings.sounding import Sounding, SoundingError
 from ..case.case import Case
 from ..case.climb import Climb
 from ..case.provenance import provenance
-from ..flight_load.limit_table import LimitError, Limits, limit_table
+from ..flight_load.limit_table import LimitError, Limits
 from ..flight_load.load import DESIGN
-from ..flight_load.passage import LimitedLoad, Passage
-from ..flight_load.process import Grid, JointOutputs, joint_covariance
+from ..flight_load.passage import Passage
+from ..flight_load.process import joint_covariance
 from ..flight_load.request import checked_draws
 from ..flight_load.window import checked_window, window_chain
 from ..present.netcdf import RULE
@@ -43,12 +42,16 @@ from ..statistics.norm import NormOfNormal
 from ..statistics.percentiles import Sides, checked_sides
 from ..statistics.resultants import resultant_pairs
 from .conditioning import Measured
-from .level_weights import LevelWeights, level_weights
+from .level_weights import LevelWeights
+from .limited_loads import LimitedLoads, Row, limited_loads, row_weights, symmetric
 from .met_winds import MetWinds, met_winds
+from .other_winds import in_mean_winds
 from .persistence import ComponentPersistence, Persistence
 from .wind_field import Lasting, WindField, default_persistence, wind_field
 
 STEPS, FINER = 240, 10  # of the window, and of each for the chance of passing a limit
+STRIDES = (1, 2, 5, FINER)  # of the finer steps, where there are many loads
+MOST_VALUES = 3000  # loads and times whose joint covariance is made
 LEFT_OUT = 2e-3  # of the instants' chances, at either end
 FEWEST = 4  # coarse steps looked at
 ERROR = 1.0  # m/s in a component, of a balloon's wind
@@ -92,10 +95,15 @@ class Flight:
     Attributes
     ----------
     case : Case
-    responses : tuple of str
+    loads : LimitedLoads
+        The responses, or loads along the vehicle, and their limits.
+    about : Case
+        The same in the mean wind that deviations of the vehicle act in.
     field : WindField
     weights : LevelWeights
-        Of the responses at the field's levels.
+        Of the loads at the field's levels.
+    by_wave : (m, r, c N) array
+        Loads by each wave of the wind.
     mean : (m, r) array
     covariance : (m, r, r) array
         Of all sources, at each time.
@@ -104,9 +112,11 @@ class Flight:
     """
 
     case: Case
-    responses: tuple[str, ...]
+    loads: LimitedLoads
+    about: Case
     field: WindField
     weights: LevelWeights
+    by_wave: NDArray[np.float64]
     mean: NDArray[np.float64]
     covariance: NDArray[np.float64]
     window: tuple[float, float]
@@ -116,25 +126,27 @@ class Flight:
         """Of the responses, (m, r)."""
         return np.sqrt(np.maximum(np.einsum("mrr->mr", self.covariance), 0.0))
 
-    @cached_property
-    def by_wave(self) -> NDArray[np.float64]:
-        """Responses to each wave of the wind, (m, r, c N)."""
-        return self.weights.weight @ self.field.waves
+    def fine(self, loads: LimitedLoads, first: int, last: int) -> FinePart:
+        """Return some of the loads between two of the coarse times (numbers), at close times."""
+        count = FINER * (last - first) + 1
+        stride = next(k for k in STRIDES if k == FINER or count * len(loads.rows) <= k * MOST_VALUES)
+        points = slice(FINER * first // stride, FINER * last // stride + 1)
+        season, about = (
+            window_chain(case, self.window, FINER * STEPS // stride).part(points) for case in (self.case, self.about)
+        )
+        _, _, mean = loads.over(season)
+        row, _, _ = loads.over(about, self.about)
+        weight = self._fine_weights(stride, loads.rows).weight[points]
+        return FinePart(season.times, weight, mean, joint_covariance(about, row), row @ about.noise_matrix)
 
-    def fine(self, names: tuple[str, ...], first: int, last: int) -> FinePart:
-        """Return some responses between two of the coarse times (numbers) on the fine grid."""
-        chain = window_chain(self.case, self.window, FINER * STEPS)
-        weights = level_weights(self.case, chain.times.tolist(), self.field.levels, names)
-        points = slice(FINER * first, FINER * last + 1)
-        rows = [self.case.system.output_index(name) for name in names]
-        part = chain.part(points)
-        row = part.output[:, rows]
-        direct = row @ part.noise_matrix
-        size = np.sqrt((direct**2).sum(axis=2))
-        largest = np.take_along_axis(direct, np.abs(direct).argmax(axis=2)[..., None], axis=2)[..., 0]
-        covariance = joint_covariance(part, row)
-        diffusion = np.copysign(size, largest)
-        return FinePart(part.times, weights.weight[points], part.mean[:, rows], covariance, diffusion)
+    def _fine_weights(self, stride: int, rows: tuple[Row, ...]) -> LevelWeights:
+        """Return the weights of some rows at every so many of the close times of the window; kept."""
+
+        def made() -> LevelWeights:
+            chain = window_chain(self.case, self.window, FINER * STEPS // stride)
+            return row_weights(self.case, replace(self.loads, rows=rows, limits=()), chain, self.field.levels)
+
+        return self.case.kept(("fine weights", self.window, stride, rows), made)
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,16 +159,18 @@ class FinePart:
         s.
     weight : (m, r, c N) array
         Of the wind at the field's levels.
-    mean, diffusion : (m, r) arrays
+    mean : (m, r) array
     covariance : (m, r, m, r) array
         Of all sources.
+    direct : (m, r, noises) array
+        What white noise does to the loads directly.
     """
 
     times: NDArray[np.float64]
     weight: NDArray[np.float64]
     mean: NDArray[np.float64]
     covariance: NDArray[np.float64]
-    diffusion: NDArray[np.float64]
+    direct: NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -170,7 +184,6 @@ class DayOfLaunch:
     persistence : Persistence or ComponentPersistence
     error : float
         Standard deviation of a measured wind's error, m/s, independent from level to level.
-    limits : Limits or None
     threshold : float
         Probability of passing a limit above which it is no-go.
     sides : {'both', 'upper', 'lower'}
@@ -183,7 +196,6 @@ class DayOfLaunch:
     balloons: Balloons
     persistence: Lasting
     error: float
-    limits: Limits | None
     threshold: float
     sides: Sides
     draws: int
@@ -197,8 +209,13 @@ class DayOfLaunch:
 
     @property
     def responses(self) -> tuple[str, ...]:
-        """Names, r of them."""
-        return self.flight.responses
+        """Names of the responses, or of the loads along the vehicle, r of them."""
+        return self.flight.loads.labels
+
+    @property
+    def limits(self) -> Limits | None:
+        """What may not be passed."""
+        return self.flight.loads.table
 
     @cached_property
     def _rows(self) -> NDArray[np.float64]:
@@ -321,11 +338,20 @@ class DayOfLaunch:
         return found if self.met.both else found.isel(component=0, drop=True)
 
     def limit(self) -> NDArray[np.float64]:
-        """Return the limits of the responses that have one, NaN elsewhere, (m, r)."""
-        found = np.full(self.mean.shape, np.nan)
-        for r, name in enumerate(self.responses):
-            if self.limits is not None and name in self.limits.values:
-                found[:, r] = self.limits.of(name, self._unit(name), self.times)[:, 0]
+        """Return the limits of the responses that have one by themselves, NaN elsewhere, (m, r)."""
+        found, loads = np.full(self.mean.shape, np.nan), self.flight.loads
+        for limit, values in zip(loads.limits, loads.values(self.times).T, strict=True):
+            if len(limit.rows) == 1:
+                found[:, limit.rows[0]] = values
+        return found
+
+    def resultant_limit(self) -> NDArray[np.float64]:
+        """Return the limits of the resultants that have one, NaN elsewhere, (m, resultants)."""
+        loads, names = self.flight.loads, self.resultants
+        found = np.full((self.times.size, len(names)), np.nan)
+        for limit, values in zip(loads.limits, loads.values(self.times).T, strict=True):
+            if len(limit.rows) == 2:
+                found[:, names.index(limit.load.label)] = values
         return found
 
     def margin_in_sigmas(self, climatology: bool = False) -> NDArray[np.float64]:
@@ -385,6 +411,33 @@ class DayOfLaunch:
         ]
         return replace(self, balloons=Balloons(*parts, names=self.balloons.names + new.names))
 
+    def about_its_mean(self) -> DayOfLaunch:
+        """Return the same with the vehicle's own deviations acting on the mean flight of the day, not of the season.
+
+        In a strong wind they do more, in a calm one less. The vehicle is integrated once in the wind expected.
+
+        Returns
+        -------
+        DayOfLaunch
+
+        Raises
+        ------
+        IntegrationError
+        """
+        flight, field = self.flight, self.flight.field
+        expected = self.wind["mean"].values.reshape(field.components, -1)
+
+        def of_day(number: int, levels: NDArray[np.float64]) -> NDArray[np.float64]:
+            season = field.mean_at(np.clip(levels, field.levels[0], field.levels[-1]), number)
+            inside = np.clip(levels, field.levels[0], field.levels[-1])
+            return np.interp(inside, field.levels, expected[number]) - season
+
+        about = in_mean_winds(flight.case, of_day, added=True)
+        row, _, _ = flight.loads.over(window_chain(about, flight.window, STEPS), about)
+        chain = window_chain(about, flight.window, STEPS)
+        covariance = symmetric(row @ chain.covariance() @ row.swapaxes(1, 2))
+        return replace(self, flight=replace(flight, about=about, covariance=covariance))
+
     def with_persistence(self, persistence: Lasting) -> DayOfLaunch:
         """Return the same with another persistence.
 
@@ -418,7 +471,7 @@ class DayOfLaunch:
             {
                 "time": ("time", self.times, {"units": "s", "long_name": "flight time"}),
                 "response": list(self.responses),
-                "unit": ("response", [self._unit(name) for name in self.responses]),
+                "unit": ("response", [self.unit(name) for name in self.responses]),
             },
             provenance(self.flight.case)
             | {
@@ -434,7 +487,7 @@ class DayOfLaunch:
             found = found.assign_coords(
                 resultant=list(self.resultants),
                 resultant_unit=(
-                    "resultant", [self._unit(pair[0]) for pair in resultant_pairs(self.responses).values()]
+                    "resultant", [self.unit(pair[0]) for pair in resultant_pairs(self.responses).values()]
                 ),
             )  # fmt: skip
             for name, season, text in (
@@ -453,20 +506,25 @@ class DayOfLaunch:
     def _repr_html_(self) -> str:
         return html_of(repr(self))
 
-    def _unit(self, name: str) -> str:
-        system = self.flight.case.system
-        return system.outputs[system.output_index(name)].unit
+    def unit(self, response: str) -> str:
+        """Return the unit of a response or load.
+
+        Parameters
+        ----------
+        response : str
+        """
+        return self.flight.loads.rows[self.responses.index(response)].unit
 
     def _passage(self, given: bool) -> Passage:
         """Return the passage given the measurements, or of the season, on the fine grid where it is worth while."""
-        limit = self.limit()
-        at = np.flatnonzero(np.isfinite(limit).all(axis=0))
-        if not at.size or self.limits is None:
+        flight, loads = self.flight, self.flight.loads
+        if not loads.limits:
             raise LimitError("there is no limit of the responses; give limits= to ask for a probability")
-        flight, names = self.flight, [self.responses[r] for r in at]
-        mean, std = (self.mean, self.std) if given else (flight.mean, flight.std)
-        begin, end = worth_while(mean[:, at], std[:, at], limit[:, at], self.sides)
-        fine = flight.fine(tuple(names), begin, end)
+        of = self if given else flight
+        chance = loads.chances(of.mean, of.covariance, loads.values(self.times), self.sides)
+        begin, end = worth_while(chance)
+        loads, _ = loads.only(matter(chance))
+        fine = flight.fine(loads, begin, end)
         level_mean, covariance = fine.mean, fine.covariance
         if given:
             by_level = flight.field.waves @ self._seen_now.T  # cov(wind at levels, measurements)
@@ -476,31 +534,30 @@ class DayOfLaunch:
         variance = np.maximum(np.einsum("mrmr->mr", covariance), 0.0)
         across_step = np.einsum("mrmr->mr", covariance[:-1, :, 1:])
         moved = np.maximum(variance[:-1] + variance[1:] - 2 * across_step, 0.0) / np.diff(fine.times)[:, None]
-        left = np.sqrt(np.concatenate([moved, moved[-1:]]))
-        diffusion = np.sign(fine.diffusion) * np.minimum(np.abs(fine.diffusion), left)
-        loads = [LimitedLoad(name, self._unit(name)) for name in names]
-        values = np.stack([self.limits.of(name, self._unit(name), fine.times)[:, 0] for name in names], axis=1)
-        process = JointOutputs(Grid(fine.times, level_mean, diffusion), covariance)
-        return Passage(flight.case, loads, process, values, self.sides, DESIGN, self.draws, self.seed)
+        left, size = np.sqrt(np.concatenate([moved, moved[-1:]])), np.sqrt((fine.direct**2).sum(axis=2))
+        share = np.minimum(1.0, np.divide(left, size, out=np.ones(size.shape), where=size > 0))
+        process = loads.process(fine.times, level_mean, covariance, fine.direct * share[..., None])
+        limited, values = [limit.load for limit in loads.limits], loads.values(fine.times)
+        return Passage(flight.case, limited, process, values, self.sides, DESIGN, self.draws, self.seed)
 
 
-def worth_while(
-    mean: NDArray[np.float64], std: NDArray[np.float64], limit: NDArray[np.float64], sides: Sides
-) -> tuple[int, int]:
-    """Return the first and last of the coarse times outside which limits are passed too rarely to matter."""
-    unit = np.where(std > 0, std, np.inf)
-    chance = np.zeros(mean.shape)
-    if sides != "lower":
-        chance += norm.sf((limit - mean) / unit)
-    if sides != "upper":
-        chance += norm.sf((limit + mean) / unit)
+def worth_while(chance: NDArray[np.float64]) -> tuple[int, int]:
+    """Return the first and last of the coarse times outside which limits are passed too rarely, by chances (m, q)."""
     total = np.cumsum(chance.sum(axis=1))
     if not total[-1] > 0:
         return 0, FEWEST
     first = int(np.searchsorted(total, LEFT_OUT * total[-1])) - 1
     last = int(np.searchsorted(total, (1 - LEFT_OUT) * total[-1])) + 1
-    first = min(max(first, 0), mean.shape[0] - 1 - FEWEST)
-    return first, min(max(last, first + FEWEST), mean.shape[0] - 1)
+    first = min(max(first, 0), len(chance) - 1 - FEWEST)
+    return first, min(max(last, first + FEWEST), len(chance) - 1)
+
+
+def matter(chance: NDArray[np.float64]) -> list[int]:
+    """Return which limits are passed often enough to matter, by chances (m, q) of the instants; one at least."""
+    each = chance.sum(axis=0)
+    order = np.argsort(each)
+    left = int(np.searchsorted(np.cumsum(each[order]), LEFT_OUT * each.sum()))
+    return sorted(order[min(left, each.size - 1) :].tolist())
 
 
 def day_of_launch(
@@ -524,23 +581,14 @@ def day_of_launch(
     for name, value, good in (("error", error, 0 <= error < np.inf), ("threshold", threshold, 0 < threshold < 1)):
         if not good:
             raise ParameterValueError(f"{name} = {value!r} cannot be used; an error is m/s, a threshold a probability")
-    table = None if limits is None else limit_table(limits)
-    if table is not None and table.station is not None:
-        raise LimitError(
-            "is over stations of the structure; on the day of launch limits are of responses over time", file=table.file
-        )
-    wanted = list(table.values) if responses is None and table is not None else responses
-    names, flown = case.checked_responses(wanted), checked_window(case, window)
-    if table is not None:
-        case.checked_responses(table.values)
-        for name in table.values:
-            table.of(name, case.system.outputs[case.system.output_index(name)].unit, np.array(flown))
+    flown, chosen = checked_window(case, window), checked_sides(sides)
+    loads = limited_loads(case, limits, responses, flown, chosen)
     balloons: list[Balloon] = list(soundings) if isinstance(soundings, list | tuple) else [cast("Balloon", soundings)]
     hours = list(hours_before) if isinstance(hours_before, Sequence) else [hours_before]
     if len(balloons) != len(hours):
         raise ParameterValueError(f"{len(balloons)} soundings and {len(hours)} times before launch; give one each")
     met = met_winds(case, component, sign)
-    flight = _flight(case, tuple(names), flown)
+    flight = _flight(case, loads, flown)
     found = _balloons(flight, list(zip(balloons, hours, strict=True)), met, error)
     lasting = persistence
     if lasting is None:
@@ -551,20 +599,20 @@ def day_of_launch(
         raise ParameterValueError(
             f"the vehicle meets the {met.components[0]} wind alone; give the Persistence of that component"
         )
-    return DayOfLaunch(flight, found, lasting, float(error), table, threshold, checked_sides(sides), draws, seed, met)
+    return DayOfLaunch(flight, found, lasting, float(error), threshold, chosen, draws, seed, met)
 
 
-def _flight(case: Case, names: tuple[str, ...], window: tuple[float, float]) -> Flight:
-    def made() -> Flight:
+def _flight(case: Case, loads: LimitedLoads, window: tuple[float, float]) -> Flight:
+    field = wind_field(case, float(Climb.of(case).altitude(window[1])))
+
+    def made() -> tuple[LevelWeights, NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         chain = window_chain(case, window, STEPS)
-        at = [case.system.output_index(name) for name in names]
-        field = wind_field(case, float(Climb.of(case).altitude(window[1])))
-        weights = level_weights(case, chain.times.tolist(), field.levels, names)
-        row = chain.output[:, at]
-        covariance = row @ chain.covariance() @ row.swapaxes(1, 2)
-        return Flight(case, names, field, weights, chain.mean[:, at], covariance, window)
+        row, _, mean = loads.over(chain)
+        covariance = symmetric(row @ chain.covariance() @ row.swapaxes(1, 2))
+        weights = row_weights(case, loads, chain, field.levels)
+        return weights, weights.weight @ field.waves, mean, covariance
 
-    return case.kept(("day of launch", names, window), made)
+    return Flight(case, loads, case, field, *case.kept(("day of launch", loads.rows, window), made), window)
 
 
 def _balloons(flight: Flight, given: Sequence[tuple[Balloon, float]], met: MetWinds, error: float) -> Balloons:

@@ -6,12 +6,16 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
+from ..flight_load.passage import LimitedLoad
 from ..present.style import COLORS, SHADES, STYLE, display, words, wrapped
 from .day_of_launch import BAND, DayOfLaunch
+from .limited_loads import Limit
 from .persistence import EXPONENTS
 from .wind_field import default_persistence
 
+MOST_SENTENCES = 6  # on what drives it
 CAVEAT = (
     "Gaussian winds: changes of wind have heavier tails (excess kurtosis of 24-h changes at the Cape up to 1.9), so "
     "that small chances are too small. Errors of the wind's filter and of the vehicle's model are not in them."
@@ -37,34 +41,52 @@ def bracket(launch: DayOfLaunch) -> list[tuple[float, float]]:
 
 
 def drivers(launch: DayOfLaunch) -> list[str]:
-    """Return sentences on what drives the chance: which limit, when, where, and of which uncertainty.
+    """Return sentences on what drives the chance: which limits, when, where, and of which uncertainty.
 
     Parameters
     ----------
     launch : DayOfLaunch
     """
-    passage, told = launch.passage, []
-    chance, climb = passage.by_load.values, launch.flight.weights
-    margin = launch.margin_in_sigmas()
+    passage, told, climb = launch.passage, [], launch.flight.weights
     taken = launch.flight.std**2 - launch.std**2
     by_wind = (launch.flight.by_wave**2).sum(axis=2) - taken
-    for k in np.argsort(-chance):
-        name = passage.loads[int(k)].name
-        r = launch.responses.index(name)
-        at = int(np.nanargmin(margin[:, r]))
-        factor, unit = display(passage.loads[int(k)].unit, launch.limit()[:, r])
+    for chance, load, limit, values in often_passed(launch, MOST_SENTENCES):
+        factor, unit = display(load.unit, values)
+        if len(limit.rows) == 2:
+            level = launch.law(load.label).percentile(passage.design)
+            at = int((level / values).argmax())
+            told.append(
+                f"{words(load.label)}: passed by {chance:.2g} of flights; nearest at {launch.times[at]:.1f} s, "
+                f"{climb.altitude[at] / 1000:.1f} km: {factor * level[at]:.4g} is passed with {passage.design:g} at "
+                f"that instant, limit {factor * values[at]:.4g} {unit}"
+            )
+            continue
+        r, margin = limit.rows[0], launch.margin_in_sigmas()[:, limit.rows[0]]
+        at = int(np.nanargmin(margin))
         share = float(np.clip(by_wind[at, r] / launch.std[at, r] ** 2, 0, 1)) if launch.std[at, r] > 0 else 0.0
         told.append(
-            f"{words(name)}: passed by {chance[k]:.2g} of flights; nearest at {launch.times[at]:.1f} s, "
+            f"{words(load.label)}: passed by {chance:.2g} of flights; nearest at {launch.times[at]:.1f} s, "
             f"{climb.altitude[at] / 1000:.1f} km: expected {factor * launch.mean[at, r]:.4g}, one sigma "
-            f"{factor * launch.std[at, r]:.3g}, limit {factor * launch.limit()[at, r]:.4g} {unit}, {margin[at, r]:.1f} "
-            f"sigma off; {100 * share:.0f} % of that variance is wind that may still change or was not seen, the rest "
-            "the vehicle's and what is finer than 25 m"
+            f"{factor * launch.std[at, r]:.3g}, limit {factor * values[at]:.4g} {unit}, {margin[at]:.1f} sigma off; "
+            f"{100 * share:.0f} % of that variance is wind that may still change or was not seen, the rest the "
+            "vehicle's and what is finer than 25 m"
         )
     return told
 
 
-def launch_page(launch: DayOfLaunch, title: str) -> str:
+def often_passed(launch: DayOfLaunch, most: int) -> list[tuple[float, LimitedLoad, Limit, NDArray[np.float64]]]:
+    """Return the limits that are passed most often: with what chance, what of, and their values over the times."""
+    loads, passage = launch.flight.loads, launch.passage
+    by_label = {limit.load.label: k for k, limit in enumerate(loads.limits)}
+    chance, values, found = passage.by_load.values, loads.values(launch.times), []
+    for k in np.argsort(-chance)[:most]:
+        load = passage.loads[int(k)]
+        number = by_label[load.label]
+        found.append((float(chance[k]), load, loads.limits[number], values[:, number]))
+    return found
+
+
+def launch_page(launch: DayOfLaunch, title: str, by_season: float | None = None) -> str:
     """Return the page as Markdown.
 
     Parameters
@@ -72,6 +94,8 @@ def launch_page(launch: DayOfLaunch, title: str) -> str:
     launch : DayOfLaunch
         With limits.
     title : str
+    by_season : float, optional
+        The chance with the vehicle's deviations acting on the season's mean flight.
     """
     p, season = launch.passage.probability, launch.climatological_passage.probability
     low, high = p.interval
@@ -79,8 +103,13 @@ def launch_page(launch: DayOfLaunch, title: str) -> str:
         f"# {'GO' if launch.go else 'NO-GO'}: {title}",
         "",
         f"- Chance of passing any limit: **{p.value:.2g}** (95 % of the sampling: {low:.2g} to {high:.2g}; threshold "
-        f"{launch.threshold:g})",
+        f"{launch.threshold:g}; the grid of times leaves {100 * p.spacing_error:.1f} % of it open)",
         f"- Of the season, nothing measured: {season.value:.2g}",
+        *(
+            []
+            if by_season is None
+            else [f"- With the vehicle's deviations as in the season's mean flight: {by_season:.2g}"]
+        ),
         *(f"- With growth of winds' change by lag to the power {q:.2g}: {chance:.2g}" for q, chance in bracket(launch)),
         *(f"- Measured: {name}" for name in launch.balloons.names),
         f"- {int((launch.balloons.component == 0).sum())} levels from {launch.balloons.altitude.min():.0f} to "
@@ -107,13 +136,14 @@ def launch_figure(launch: DayOfLaunch, title: str) -> Figure:
     Parameters
     ----------
     launch : DayOfLaunch
+        With limits.
     title : str
 
     Returns
     -------
     matplotlib.figure.Figure
     """
-    shown = launch.responses[:3]
+    shown = often_passed(launch, 3)
     with rc_context(STYLE):
         figure = Figure(figsize=(11.0 if not launch.met.both else 14.0, 2.6 + 2.4 * len(shown)), layout="constrained")
         columns = len(launch.met.components)
@@ -124,32 +154,38 @@ def launch_figure(launch: DayOfLaunch, title: str) -> Figure:
             axes.set_xlabel(f"{component} wind (m/s)" if launch.met.both else "wind along +Y (m/s)")
             if not number:
                 axes.legend(fontsize=8)
-        limit = launch.limit()
-        for k, name in enumerate(shown):
-            panel, r = figure.add_subplot(grid[k, -1]), launch.responses.index(name)
-            unit = launch.flight.case.system.outputs[launch.flight.case.system.output_index(name)].unit
-            factor, unit = display(unit, np.abs(launch.mean[:, r]) + launch.std[:, r])
-            for m, s, color, strength, label in (
-                (launch.flight.mean[:, r], launch.flight.std[:, r], "#bbbbbb", 0.35, "season, 90 %"),
-                (launch.mean[:, r], launch.std[:, r], COLORS["wind"], 0.3, "at launch, 90 %"),
+        for k, (_, load, limit, values) in enumerate(shown):
+            panel = figure.add_subplot(grid[k, -1])
+            factor, unit = display(load.unit, values)
+            for season, color, strength, label in (
+                (True, "#bbbbbb", 0.35, "season, 90 %"),
+                (False, COLORS["wind"], 0.3, "at launch, 90 %"),
             ):
-                panel.fill_between(launch.times, factor * (m - BAND * s), factor * (m + BAND * s), color=color,
-                                   alpha=strength, lw=0, label=label)  # fmt: skip
-            panel.plot(launch.times, factor * launch.mean[:, r], color=COLORS["wind"], lw=1.6)
-            if np.isfinite(limit[:, r]).all():
-                for side in {"both": (1, -1), "upper": (1,), "lower": (-1,)}[launch.sides]:
-                    panel.plot(launch.times, side * factor * limit[:, r], color=COLORS["combined"], lw=1.8,
-                               label="limit" if side == 1 or launch.sides == "lower" else None)  # fmt: skip
-            panel.set(ylabel=f"{words(name)} ({unit})", xlim=(launch.times[0], launch.times[-1]))
+                low, middle, high = factor * band(launch, limit, season)
+                panel.fill_between(launch.times, low, high, color=color, alpha=strength, lw=0, label=label)
+                if not season:
+                    panel.plot(launch.times, middle, color=color, lw=1.6)
+            both = (1,) if len(limit.rows) == 2 else (1, -1)
+            for side in {"both": both, "upper": (1,), "lower": (-1,)}[launch.sides]:
+                panel.plot(launch.times, side * factor * values, color=COLORS["combined"], lw=1.8,
+                           label="limit" if side == 1 or launch.sides == "lower" else None)  # fmt: skip
+            panel.set(ylabel=f"{words(load.label)} ({unit})", xlim=(launch.times[0], launch.times[-1]))
             if not k:
                 panel.legend(fontsize=8, ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.0))
             if k == len(shown) - 1:
                 panel.set_xlabel("flight time (s)")
-        told = ""
-        if launch.limits is not None:
-            told = f"\n{'GO' if launch.go else 'NO-GO'}: {launch.probability:.2g} of flights pass a limit"
+        told = f"\n{'GO' if launch.go else 'NO-GO'}: {launch.probability:.2g} of flights pass a limit"
         figure.suptitle(wrapped(f"{title}{told}"))
     return figure
+
+
+def band(launch: DayOfLaunch, limit: Limit, season: bool) -> NDArray[np.float64]:
+    """Return the lower end, the middle and the upper end of what holds 90 % of what is limited, (3, m)."""
+    if len(limit.rows) == 2:
+        law = launch.law(limit.load.label, season)
+        return np.array([law.percentile(1 - p) for p in (0.05, 0.5, 0.95)])
+    of, r = launch.flight if season else launch, limit.rows[0]
+    return np.array([of.mean[:, r] + k * BAND * of.std[:, r] for k in (-1, 0, 1)])
 
 
 def draw_wind(axes: Axes, launch: DayOfLaunch, number: int) -> None:

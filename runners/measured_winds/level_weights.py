@@ -13,7 +13,7 @@ quadratic in a step. Once there, any number of profiles costs a product of matri
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -87,36 +87,70 @@ def level_weights(
     """
     rows = [case.system.output_index(name) for name in responses]
     question = ("level weights", tuple(times), tuple(levels.tolist()), tuple(rows))
-    return case.kept(question, lambda: _level_weights(case, times, levels, rows))
+    outputs = MatrixEvaluator(case.with_means, ("C", "G"))
+
+    def matrices(number: int, node: float, low: float, high: float) -> tuple[NDArray, NDArray]:
+        C, G = outputs(node, low, high)
+        return C[rows], G[rows]
+
+    return case.kept(question, lambda: _level_weights(case, times, levels, len(rows), matrices))
 
 
-def _level_weights(case: Case, times: Sequence[float], levels: NDArray[np.float64], rows: list[int]) -> LevelWeights:
+def weights_of_rows(
+    case: Case,
+    times: Sequence[float],
+    levels: NDArray[np.float64],
+    state: NDArray[np.float64],
+    direct: NDArray[np.float64],
+) -> LevelWeights:
+    """Return the weights of what is a linear combination of the states at each time.
+
+    Parameters
+    ----------
+    case, times, levels
+        As for :func:`level_weights`.
+    state : (m, r, n) array
+    direct : (m, r, n_u) array
+        Of the known inputs.
+    """
+
+    def matrices(number: int, node: float, low: float, high: float) -> tuple[NDArray, NDArray]:
+        return state[number], direct[number]
+
+    return _level_weights(case, times, levels, state.shape[1], matrices)
+
+
+def _level_weights(
+    case: Case,
+    times: Sequence[float],
+    levels: NDArray[np.float64],
+    r: int,
+    matrices: Callable[[int, float, float, float], tuple[NDArray, NDArray]],
+) -> LevelWeights:
+    """Return the weights of r rows; ``matrices`` returns C and G of an end time by its number."""
     climb, executable = Climb.of(case), case.with_means
     system, n = executable.system, len(executable.system.states)
     nodes = time_nodes(executable, times)
     winds = [i for i, name in enumerate(system.input_names) if name in WINDS]
     scale = state_scales(system)
     begin, end, low, high = _steps(case, climb, nodes, levels)
-    evaluate, outputs = (
-        MatrixEvaluator(executable, ("A", "E", "inputs")),
-        MatrixEvaluator(executable, ("C", "G", "inputs")),
-    )
-    k, r, c = levels.size, len(rows), len(winds)
+    evaluate, known = MatrixEvaluator(executable, ("A", "E", "inputs")), MatrixEvaluator(executable, ("inputs",))
+    k, c = levels.size, len(winds)
     X, rest = np.zeros((c, n, k)), np.zeros(n)
     weight, of_rest = np.zeros((nodes.size, r, c, k)), np.zeros((nodes.size, r))
     done = 0
 
     def read(node: float, low: float, high: float) -> None:
         nonlocal done
-        C, G, inputs = outputs(node, low, high)
-        C, G = C[rows] * scale, G[rows]
-        others = inputs[:, 0].copy()
+        others = known(node, low, high)[0][:, 0].copy()
         others[winds] = 0.0
         phi = np.zeros(k)
         i, share, _ = _place(levels, float(climb.altitude(node)))
         phi[i] += 1 - share
         phi[min(i + 1, k - 1)] += share
         while done < nodes.size and nodes[done] <= node:
+            C, G = matrices(done, node, low, high)
+            C = C * scale
             weight[done] = (C @ X).swapaxes(0, 1) + G[:, winds, None] * phi
             of_rest[done] = C @ rest + G @ others
             done += 1

@@ -219,7 +219,7 @@ def test_simulated_launches_pass_as_often_as_said(as504):
         ({"error": -1.0}, ParameterValueError, "error = -1.0"),
         ({"threshold": 1.5}, ParameterValueError, "threshold = 1.5"),
         ({"factor": 9.0}, SoundingError, r"standard deviations from the mean of the vehicle's wind.*is it in knots"),
-        ({"limits": ALONG}, LimitError, "is over stations of the structure"),
+        ({"limits": ALONG}, LimitError, "is over stations of the structure; leave responses out"),
         ({"limits": aw.Limits.constant(1.0, "bending_moment", "kN m")}, LimitError, r"\[kN m\], expected \[N m\]"),
     ],
 )  # fmt: skip
