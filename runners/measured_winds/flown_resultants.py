@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..case.case import Case
 from ..case.provenance import provenance
 from ..present.netcdf import RULE
+from ..present.notebook import html_of
 from ..solvers.discretisation import symmetric_root
 from ..statistics.norm import NormOfNormal
 from .profile_statistics import independent_profiles, profile_percentiles, worst_profiles
@@ -192,6 +193,9 @@ class FlownResultants:
 
     def __repr__(self) -> str:
         return f"FlownResultants: {len(self.values)} profiles, {self.times.size} times, " + ", ".join(self.responses)
+
+    def _repr_html_(self) -> str:
+        return html_of(repr(self))
 
     def _coordinates(self) -> dict[str, object]:
         return {

@@ -113,7 +113,9 @@ def _opened(file: Path) -> xr.Dataset:
             "netCDF-3 or CSV", file=file,
         )  # fmt: skip
     try:
-        return xr.open_dataset(file, engine=engine, decode_times=engine == "cfgrib")
+        if engine == "cfgrib":
+            return xr.open_dataset(file, engine=engine, backend_kwargs={"indexpath": ""})  # no index beside the file
+        return xr.open_dataset(file, engine=engine, decode_times=False)
     except Exception as error:  # whatever a library makes of a damaged file
         raise SoundingError(f"cannot be read as {meant} ({error!s:.200})", file=file) from None
 

@@ -418,3 +418,43 @@ def test_damaged_files_are_read_or_refused(tmp_path, name):
         except DataError:
             continue
         assert not np.isinf(found.u).any() and found.u.shape == found.v.shape
+
+
+def test_grib_is_read_by_its_library(tmp_path):
+    """A file that ecCodes writes, of two times, three levels and four places: GRIB's sixteen bits, no index left."""
+    pytest.importorskip("cfgrib")
+    eccodes = pytest.importorskip("eccodes")
+    levels, times = (850, 500, 250), (0, 1200)
+    random = np.random.default_rng(3)
+    shape = (len(times), len(levels), 4)
+    fields = {
+        "u": random.normal(10, 8, shape),
+        "v": random.normal(0, 8, shape),
+        "z": 9.80665 * random.normal(5e3, 9, shape),
+    }
+    fields["z"] += 9.80665 * np.array([-3500.0, 600.0, 5400.0])[:, None]
+    file = tmp_path / "field.grib"
+    with file.open("wb") as stream:
+        for name, values in fields.items():
+            for t, time in enumerate(times):
+                for k, level in enumerate(levels):
+                    message = eccodes.codes_grib_new_from_samples("regular_ll_pl_grib2")
+                    keys = {
+                        "shortName": name, "dataDate": 20230522, "dataTime": time, "level": level, "Ni": 2, "Nj": 2,
+                        "latitudeOfFirstGridPointInDegrees": 40.0, "latitudeOfLastGridPointInDegrees": 39.0,
+                        "longitudeOfFirstGridPointInDegrees": 351.0, "longitudeOfLastGridPointInDegrees": 352.0,
+                        "iDirectionIncrementInDegrees": 1.0, "jDirectionIncrementInDegrees": 1.0, "bitsPerValue": 16,
+                    }  # fmt: skip
+                    for key, value in keys.items():
+                        eccodes.codes_set(message, key, value)
+                    eccodes.codes_set_values(message, values[t, k])
+                    eccodes.codes_write(message, stream)
+                    eccodes.codes_release(message)
+    found, quality = read_profiles(file, latitude=39.0, longitude=-8.0)  # the last of the four
+    assert [s.time.hour for s in found] == [0, 12]
+    assert quality.read == 2
+    for t, sounding in enumerate(found):
+        np.testing.assert_allclose(sounding.altitude, fields["z"][t, :, 3] / 9.80665, rtol=1e-4)
+        np.testing.assert_allclose(sounding.u, fields["u"][t, :, 3], atol=2e-3)
+        np.testing.assert_allclose(sounding.v, fields["v"][t, :, 3], atol=2e-3)
+    assert [p.name for p in tmp_path.iterdir()] == ["field.grib"]

@@ -55,6 +55,8 @@ def test_far_from_launch_the_chance_is_the_seasons(planes, limits, cache, reques
     assert {load.resultant for load in found.loads} == {planes == "both"}
 
 
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::ascentwind.errors.UncheckedStationsWarning")
 def test_loads_at_stations_are_those_of_the_vehicle(as504):
     """Mean and sigma at a station far from launch, against the loads along the vehicle; weights against the mean."""
     found = as504.day_of_launch(balloon(as504), 1e9, limits=STATIONS, window=WINDOW)
@@ -89,6 +91,7 @@ def test_deviations_act_in_the_days_mean(as504):
     assert np.abs(gained[::40] - wanted).max() < 5e-3 * np.abs(wanted).max()
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::ascentwind.errors.UncheckedStationsWarning")
 def test_months_with_limits_along_stations(as504):
     """Every station is passed less often than all of them, and one response alone less often than its stations."""
@@ -99,6 +102,7 @@ def test_months_with_limits_along_stations(as504):
     assert 0 <= found["stopped"].item() < 1
 
 
+@pytest.mark.slow
 def test_months_with_a_limit_of_the_resultant(both):
     turned = np.radians([72.0, 252.0])
     found = both.availability(RESULTANT, months=["february"], azimuths=turned, window=WINDOW)
