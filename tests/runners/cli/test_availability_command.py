@@ -9,6 +9,7 @@ import xarray as xr
 
 from ascentwind.model.wind.month_winds import read_months
 from ascentwind.runners.cli.app import main
+from ascentwind.runners.measured_winds.random_wind import filter_wind
 from ascentwind.runners.wind import month_fit
 
 
@@ -70,6 +71,19 @@ def test_months_of_soundings(tmp_path, monkeypatch, capsys):
     np.testing.assert_allclose(found.mean[0], u[:31].mean(axis=0), rtol=1e-6)
     assert run(monkeypatch, *asked, "--months", "april") == 2
     assert "statistics need 10" in " ".join(capsys.readouterr().err.split())
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::ascentwind.errors.StalledFitWarning")
+def test_a_month_made_again_is_the_shipped_one(tmp_path, monkeypatch):
+    """January by the command: of each component within 0.1 m2/s2 rms, of their sum 1.5, if a fit stops at its limit."""
+    assert run(monkeypatch, "wind", "months", "--months", "january", "--out", tmp_path) == 0
+    (made,), (shipped,) = read_months(tmp_path), read_months(None, ["january"])
+    h = shipped.altitude
+    for weights, most in (((1.0, 0.0), 0.1), ((0.0, 1.0), 0.1), ((1.0, 1.0), 1.5)):
+        here, there = (filter_wind(m.filter_along(weights), h, 0 * h).covariance for m in (made, shipped))
+        assert np.sqrt(np.mean((here - there) ** 2)) < most
+    np.testing.assert_allclose(made.mean, shipped.mean, rtol=1e-7)
 
 
 class Fitted:
