@@ -31,7 +31,7 @@ def test_files_of_availability(cache, tmp_path, monkeypatch, capsys):
     told = " ".join(capsys.readouterr().out.split())
     assert "january" in told and "june" in told and "stops" in told
     rows = (tmp_path / "out" / "availability.csv").read_text().splitlines()
-    assert rows[0] == "month,azimuth_deg,probability,lower,upper,stopped,remaining_risk"
+    assert rows[0] == "month,azimuth_deg,probability,lower,upper,standard_error,spacing_error,stopped,remaining_risk"
     assert [row.split(",")[:2] for row in rows[1:]] == [[m, a] for m in ("january", "june") for a in ("60", "100")]
     with xr.open_dataset(tmp_path / "out" / "availability.nc") as found:
         assert found["probability"].sizes == {"month": 2, "azimuth": 2}

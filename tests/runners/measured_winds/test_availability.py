@@ -134,7 +134,7 @@ def test_a_check_stops_the_bad_days(as504):
         ({"threshold": 2.0}, ParameterValueError, "threshold = 2.0"),
         ({"check_hours": -1.0}, ParameterValueError, "a check -1.0 h before launch"),
         ({"limits": aw.Limits.constant(1.0, "bending_moment", "kN m")}, LimitError, r"\[kN m\], expected \[N m\]"),
-        ({"limits": aw.Limits.constant(1.0, "moment", "N m")}, UnknownNameError, "did you mean 'bending_moment'"),
+        ({"limits": aw.Limits.constant(1.0, "moment", "N m")}, LimitError, "did you mean 'bending_moment'"),
         ({"winds": "nowhere"}, DataError, "nowhere: holds no month"),
     ],
 )
