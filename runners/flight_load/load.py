@@ -33,7 +33,7 @@ from .pathwise import Movement, Reaching, movement, reaching
 from .probability import Estimate, Level, estimate, find_level
 from .process import ManyOutputs
 from .request import SpacingWarning, checked_draws, checked_level, refuse_without_variance
-from .response import MOST_STEPS, ResponseInWindow, squared_diffusion
+from .response import STEPS, ResponseInWindow, squared_diffusion
 from .sampling import draw_beyond, instant_levels, sighted_steps, steps_near
 from .sensitivity import level_sensitivity
 from .uncertain_parameter import checked_spread, processes_of, uncertain_level
@@ -42,6 +42,7 @@ from .wind_interval import wind_interval_of
 from .window import checked_window
 
 DESIGN = 0.00135  # 1 - Phi(3): with this chance an instant passes mean + 3 sigma
+MOST_STEPS = 9600
 SPACING_ERROR = 0.02  # relative, of a probability; finer where it is larger
 DRAWS = 2000
 MOVED = 8000  # draws of paths that just reach a level, of which derivatives are made
@@ -94,26 +95,17 @@ class FlightLoad:
     @cached_property
     def process(self) -> Process:
         """The response as a Gaussian process over the window, or the norm of two."""
-        return self.of.whole.process()
+        return self.of.process()
 
     @cached_property
     def parts(self) -> tuple[ResponseInWindow, ...]:
-        """Where flights pass the level of each probability: a part of the window of a resultant, or of many steps."""
-        return tuple(self.of.near(p, self.sides) for p in self.probabilities)
-
-    @property
-    def steps(self) -> int:
-        """Of the grid on which paths are seen."""
-        return self.of.steps if self.of.is_resultant else max(part.steps for part in self.parts)
+        """Where flights pass the level of each probability: of a resultant a part of the window."""
+        return tuple(self.of.near(p) for p in self.probabilities)
 
     @cached_property
     def processes(self) -> tuple[Process, ...]:
         """The response as a process there, one a probability."""
-        whole = self.of.whole
-        return tuple(
-            self.process if (part.window, part.steps) == (whole.window, whole.steps) else part.process()
-            for part in self.parts
-        )
+        return tuple(part.process() if part.is_resultant else self.process for part in self.parts)
 
     def _boundary(self, value: float) -> Boundary:
         return Boundary.around(np.full(self.process.seen.mean.shape, value), self.sides)
@@ -341,7 +333,7 @@ class FlightLoad:
         NotDifferentiableError
             White noise reaches the rate of the response, whose variance is infinite.
         """
-        return upcrossing_rate(self.of.whole, checked_level(level), self.sides)
+        return upcrossing_rate(self.of, checked_level(level), self.sides)
 
     def number_of(self, probability: float | None) -> int:
         """Return the number of a probability among those asked for.
@@ -560,7 +552,7 @@ class FlightLoad:
         return found.assign_attrs(
             provenance(self.of.case)
             | {"response": self.response, "unit": self.unit, "sides": self.sides, "window_s": list(self.window)}
-            | {"draws": self.draws, "seed": self.seed, "steps": self.steps}
+            | {"draws": self.draws, "seed": self.seed, "steps": self.of.steps}
         )
 
     def __repr__(self) -> str:
@@ -600,18 +592,18 @@ def flight_load(
     checked_draws(draws, seed)
     asked = checked_probabilities(probabilities)
     flown = checked_window(case, window)
-    asked_of = ResponseInWindow.resolved(case, name, flown)
+    asked_of = ResponseInWindow(case, name, flown, STEPS)
     unit = asked_of.unit
     limits = None if limit is None else limits_over_time(limit, name, unit, flown)
     if asked_of.is_resultant and sided != "both":
         raise ParameterValueError(f"'{name}' is a resultant, which has no {sided} side; ask with sides='both'")
     load = FlightLoad(asked_of, asked, sided, draws, seed, limits)
     refuse_without_variance(name, load.processes[0])
-    while (missed := load.spacing_missed) > SPACING_ERROR and load.steps < MOST_STEPS:
+    while (missed := load.spacing_missed) > SPACING_ERROR and load.of.steps < MOST_STEPS:
         load = replace(load, of=replace(load.of, steps=2 * load.of.steps))
     if missed > SPACING_ERROR:
         text = (
-            f"the grid of {load.steps} steps still misses about {100 * missed:.2g} % of the probability that "
+            f"the grid of {load.of.steps} steps still misses about {100 * missed:.2g} % of the probability that "
             f"'{name}' passes its level; ask for a shorter window"
         )
         warnings.warn(SpacingWarning(text), stacklevel=3)

@@ -7,14 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr
 
 from ...model.errors import ParameterValueError
 from ..case.case import Case
 from ..case.chain import TOLERANCE
 from ..solvers.markov_chain import MarkovChain
 from ..statistics.norm import NormOfNormal
-from ..statistics.percentiles import Sides, instant_level
 from ..statistics.resultants import resultant_pairs
 from .norms import Norms
 from .process import JointOutputs, joint_outputs
@@ -22,10 +20,6 @@ from .window import window_chain
 
 HALVINGS = 2  # from the grid of which paths are drawn to the one on which they are seen
 STEPS = 2400  # of the window at first; AS-504 in 60 s: 0.025 s
-MOST_STEPS = 9600  # of which paths are drawn at once
-RESOLVED, LASTING = 1.0, 20.0  # rad a step of the fastest oscillation that decays no faster than that, 1/s
-LOOKED_AT, DOUBLINGS = 7, 5  # times at which oscillations are looked for, and of the steps for one, at most
-PARTS = 32  # of a window: one that is narrowed begins and ends between them, so that responses share their chains
 COARSE = 1.0  # s, between the times at which a resultant is seen where its window is worth drawing
 FINE = 0.025  # s, at most between the points at which it is seen there, at first
 LEFT_OUT = 2e-3  # of the probability, at most, that is passed only where no path is drawn
@@ -110,71 +104,26 @@ class ResponseInWindow:
         """The states at the times at which paths are seen."""
         return window_chain(self.case, self.window, self.steps, TOLERANCE)
 
-    @staticmethod
-    def resolved(case: Case, response: str, window: tuple[float, float]) -> ResponseInWindow:
-        """Return it with steps that resolve the fastest oscillation that lasts, STEPS or more; a resultant with STEPS.
-
-        Between points that are half a period apart paths of a lightly damped mode have crests that nothing shows.
-        """
-        first = ResponseInWindow(case, response, window, STEPS)
-        if first.is_resultant:
-            return first
-
-        def fastest() -> float:
-            times = np.linspace(*window, LOOKED_AT)
-            modes = [np.linalg.eigvals(case.matrices(float(t))[0]) for t in times]
-            return float(np.median([each.imag[each.real > -LASTING].max(initial=0.0) for each in modes]))
-
-        turned = case.kept(("fastest oscillation", window), fastest) * (window[1] - window[0]) / STEPS
-        doublings = int(np.clip(np.ceil(np.log2(max(turned / RESOLVED, 1.0))), 0, DOUBLINGS))
-        return replace(first, steps=STEPS * 2**doublings)
-
-    @property
-    def whole(self) -> ResponseInWindow:
-        """The same with no more steps than are drawn at once."""
-        return replace(self, steps=min(self.steps, MOST_STEPS))
-
-    def near(self, probability: float, sides: Sides) -> ResponseInWindow:
+    def near(self, probability: float) -> ResponseInWindow:
         """Return it over the part of the window in which the level passed with a probability is passed at all.
 
-        Of one response all of the window where that has no more steps than are drawn at once; both planes have twice
-        the states and are looked at where it matters.
+        Of one response all of the window; both planes have twice the states and are looked at where it matters.
         """
-        if not self.is_resultant and self.steps <= MOST_STEPS:
+        if not self.is_resultant:
             return self
         begin, end = self.window
         chain = window_chain(self.case, self.window, max(2, int(np.ceil((end - begin) / COARSE))))
         C = chain.output[:, self.rows]
-        mean, covariance = chain.mean[:, self.rows], C @ chain.covariance() @ C.swapaxes(1, 2)
-        if not float(covariance.max()) > 0:
-            return self.whole
-        if not self.is_resultant:
-            beyond = _beyond(mean[:, 0], np.sqrt(np.maximum(covariance[:, 0, 0], 0.0)), probability, sides)
-        else:
-            law = NormOfNormal(mean, covariance)
-            beyond = law.exceedance(law.percentile(probability).max())  # flights pass a higher level
+        law = NormOfNormal(chain.mean[:, self.rows], C @ chain.covariance() @ C.swapaxes(1, 2))
+        if not float(law.covariance.max()) > 0:
+            return self
+        beyond = law.exceedance(law.percentile(probability).max())  # flights pass a higher level
         kept = np.flatnonzero(beyond >= LEFT_OUT * beyond.max() / beyond.size)
         first, last = max(int(kept[0]) - 1, 0), min(int(kept[-1]) + 1, beyond.size - 1)
-        if not self.is_resultant:
-            share = (chain.times[[first, last]] - begin) / (end - begin)
-            low, high = int(np.floor(PARTS * share[0])), int(np.ceil(PARTS * share[1]))
-            window = begin + (end - begin) * low / PARTS, begin + (end - begin) * high / PARTS
-            steps = 4 * int(np.ceil(self.steps * (high - low) / PARTS / 4))
-            return replace(self, window=window, steps=min(steps, MOST_STEPS))
         part = float(chain.times[first]), float(chain.times[last])
         spacing = min(end - begin, FINE * STEPS) / self.steps
         steps = 4 * int(np.ceil((part[1] - part[0]) / spacing / 4))
         return replace(self, window=part, steps=min(max(steps, 8), self.steps))
-
-
-def _beyond(
-    mean: NDArray[np.float64], std: NDArray[np.float64], probability: float, sides: Sides
-) -> NDArray[np.float64]:
-    """Return the chance of being beyond the level that the worst instant passes with a probability, (m,)."""
-    level = instant_level(mean, std, probability, sides).max()
-    deviation = np.where(std > 0, std, 1e-12 * std.max())
-    found = {"upper": ndtr((mean - level) / deviation), "lower": ndtr((-mean - level) / deviation)}
-    return sum((chance for name, chance in found.items() if sides in (name, "both")), np.zeros_like(mean))
 
 
 def squared_diffusion(

@@ -117,33 +117,3 @@ def test_the_engine_angle_of_as504_is_bounded_and_the_others_are_rough(as504):
     for name in ("bending_moment", "angle_of_attack"):
         with pytest.raises(NotDifferentiableError):
             as504.flight_load(name, (40.0, 100.0), 0.01, draws=200).upcrossing_rate(1.0)
-
-
-@pytest.mark.slow
-def test_a_fast_oscillation_is_resolved_in_the_part_of_a_long_window_where_it_swells():
-    """130 rad/s in 110 s, as of a second bending mode: 2400 steps are most of its period. It swells in the middle.
-
-    Crests are far apart against its memory, so that a flight passes the level as often as it crosses it upward.
-    """
-    w, z, middle, wide = 130.0, 0.1, 60.0, 4.0
-    t, x, v, n = (ca.SX.sym(s) for s in ("t", "x", "v", "n"))
-    rate = -2 * z * w * v - w**2 * x + np.sqrt(4 * z * w**3) * n
-    system = define_system(
-        "second_mode", time=t, states={"x": (x, v), "v": (v, rate)}, noises={"n": n},
-        outputs={"y": ca.exp(-(((t - middle) / wide) ** 2) / 2) * x},
-        start_covariance={"n": np.diag([1.0, w**2])}, end=120.0,
-    )  # fmt: skip
-    load = Study.from_system(system).flight_load("y", (10.0, 120.0), 1e-3, sides="upper")
-    (part,) = load.parts
-    begin, end = part.window
-    assert 10 < begin < middle < end < 120
-    assert (end - begin) / part.steps * w < 1.001
-    assert load.levels[0].probability.spacing_error < 0.02
-    u = load.level.item()
-
-    def upward(time: float) -> float:
-        size = np.exp(-(((time - middle) / wide) ** 2) / 2)
-        return w / (2 * np.pi) * np.exp(-((u / size) ** 2) / 2)
-
-    crossed, _ = quad(upward, 40.0, 80.0, points=[middle])
-    assert crossed == pytest.approx(1e-3, rel=0.1)
