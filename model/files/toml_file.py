@@ -146,10 +146,10 @@ def _mended(data: Mapping[str, Any], model: type[File]) -> File | None:
 def _inside(data: Any, path: Sequence[int | str]) -> Any:
     """Return what stands at a path, None where nothing does."""
     for part in path:
-        if (isinstance(data, dict) and part in data) or (isinstance(data, list) and part in range(len(data))):
-            data = data[part]
-        else:
+        known = data if isinstance(data, dict) else dict(enumerate(data)) if isinstance(data, list) else {}
+        if part not in known:
             return None
+        data = known[part]
     return data
 
 

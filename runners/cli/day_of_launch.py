@@ -14,7 +14,7 @@ from .job import Job, load_study
 from .terminal import Changes, VehicleArgument, given, number, refuse_unused, results_folder, whole
 
 if TYPE_CHECKING:
-    from ..measured_winds.persistence import Persistence
+    from ..measured_winds.wind_field import Lasting
     from ..study import Study
 
 
@@ -97,7 +97,7 @@ def day_of_launch(
 
 def _persistence(
     study: Study, pairs: Path | None, component: str | None, lasts: float | None, exponent: float
-) -> Persistence | None:
+) -> Lasting | None:
     """Return how long winds last as the options say; None where they are silent."""
     from ...model.wind.soundings.read import read_soundings
     from ..measured_winds.persistence import Persistence

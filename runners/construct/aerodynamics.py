@@ -85,6 +85,7 @@ def component_slopes(construction: Construction, mach: ArrayLike, time: ArrayLik
     With flight times, it is zero where a component was dropped.
     """
     mach = np.atleast_1d(np.asarray(mach, float))
+    times = None if time is None else np.atleast_1d(np.asarray(time, float))
     if not construction.normal_force:
         raise DataError("the vehicle has no normal force; add [[normal_force]] to its construction")
     for component in construction.normal_force:
@@ -95,12 +96,13 @@ def component_slopes(construction: Construction, mach: ArrayLike, time: ArrayLik
             raise DataError(
                 f"the flight reaches Mach {mach[at]:g}, but normal force '{component.name}' ends at Mach "
                 f"{low if mach[at] < low else high:g}; extend its table",
-                time=None if time is None else float(np.atleast_1d(time)[at]),
+                time=None if times is None else float(times[at]),
             )
     slopes = np.array([np.interp(mach, c.mach, c.slope) for c in construction.normal_force])
-    for jettison in construction.jettisons if time is not None else ():
-        gone = [c.name in jettison.normal_force for c in construction.normal_force]
-        slopes[np.ix_(gone, np.atleast_1d(time) > jettison.time)] = 0.0
+    if times is not None:
+        for jettison in construction.jettisons:
+            gone = [c.name in jettison.normal_force for c in construction.normal_force]
+            slopes[np.ix_(np.flatnonzero(gone), np.flatnonzero(times > jettison.time))] = 0.0
     return slopes
 
 

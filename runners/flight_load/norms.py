@@ -10,6 +10,7 @@ noise has along the radius.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -48,7 +49,9 @@ class Norms:
     diffusion: Array
 
     @staticmethod
-    def joint(chain: MarkovChain, row: Array, mean: Array, halvings: int, sources: list[int] | None = None) -> Norms:
+    def joint(
+        chain: MarkovChain, row: Array, mean: Array, halvings: int, sources: Sequence[int] | None = None
+    ) -> Norms:
         """Return the norm of one pair (row (m', 2, n), mean (m', 2)); parameters as for :func:`joint_outputs`."""
         direct = row @ chain.acting_noise_matrix(sources)
         return Norms(joint_outputs(chain, row, mean, halvings, sources), (direct @ direct.swapaxes(1, 2))[:, None])

@@ -86,9 +86,10 @@ class ResponseInWindow:
 
     def share_of(self, sources: Sequence[int]) -> tuple[NDArray[np.float64], ...]:
         """Return covariance and squared diffusion on the grid drawn, as :meth:`moments`, from some sources alone."""
-        process, at = self.process(sources), slice(None, None, 2**HALVINGS)
-        outputs = process.of if isinstance(process, Norms) else process
-        return outputs.covariance, squared_diffusion(self.chain, self.chain.output[:, self.rows], sources)[at]
+        chain = self.chain
+        row, mean = chain.output[:, self.rows], chain.mean[:, self.rows]
+        covariance = joint_outputs(chain, row, mean, HALVINGS, sources).covariance
+        return covariance, squared_diffusion(chain, row, sources)[:: 2**HALVINGS]
 
     def with_parameters(self, changes: Mapping[str, float]) -> ResponseInWindow:
         """Return the same of a case with other parameter values."""

@@ -249,7 +249,8 @@ def _noise(
 
 def _direct(case: Case, loads: LimitedLoads, times: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return what known inputs do to responses directly at times (s), (m, r, n_u)."""
-    outputs, evaluate, found = [row.output for row in loads.rows], MatrixEvaluator(case.with_means, ("G",)), []
+    outputs = [row.output for row in loads.rows if row.output is not None]  # all are responses here
+    evaluate, found = MatrixEvaluator(case.with_means, ("G",)), []
     for time in times.tolist():
         here = interval_before(case.with_means, time) if time > case.system.start else None
         low, high = (time, time) if here is None else (here.low, here.high)

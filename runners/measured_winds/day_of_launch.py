@@ -612,7 +612,8 @@ def _flight(case: Case, loads: LimitedLoads, window: tuple[float, float]) -> Fli
         weights = row_weights(case, loads, chain, field.levels)
         return weights, weights.weight @ field.waves, mean, covariance
 
-    return Flight(case, loads, case, field, *case.kept(("day of launch", loads.rows, window), made), window)
+    weights, by_wave, mean, covariance = case.kept(("day of launch", loads.rows, window), made)
+    return Flight(case, loads, case, field, weights, by_wave, mean, covariance, window)
 
 
 def _balloons(flight: Flight, given: Sequence[tuple[Balloon, float]], met: MetWinds, error: float) -> Balloons:

@@ -114,8 +114,8 @@ class LimitedLoads:
         mean : (m, R) array
         """
         case = case or self.case
-        outputs = [row.output for row in self.rows]
-        if all(output is not None for output in outputs):
+        outputs = [row.output for row in self.rows if row.output is not None]
+        if len(outputs) == len(self.rows):
             return chain.output[:, outputs], None, chain.mean[:, outputs]
         m, n, R = chain.times.size, chain.output.shape[2], len(self.rows)
         state, mean = np.empty((m, R, n)), np.empty((m, R))

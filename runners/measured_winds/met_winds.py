@@ -38,7 +38,7 @@ class MetWinds:
 
     def of(self, soundings: Sounding | Soundings) -> tuple[NDArray[np.float64], ...]:
         """Return the winds of each component as the vehicle meets them, over altitude, m/s."""
-        by_name = dict(zip(COMPONENTS, (soundings.u, soundings.v), strict=True))
+        by_name: dict[str, NDArray[np.float64]] = dict(zip(COMPONENTS, (soundings.u, soundings.v), strict=True))
         return tuple(self.sign * by_name[name] for name in self.components)
 
 

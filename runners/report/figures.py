@@ -67,7 +67,7 @@ def lines(
     x_label, values = x
     plot = _plot(x_label, y_label, y_axis_type="log" if logarithmic else "linear")
     if range_x is not None:
-        plot.x_range = Range1d(*map(float, range_x))
+        plot.x_range = Range1d(start=float(range_x[0]), end=float(range_x[1]))
     keys: list[Key] = []
     if band is not None:
         key, low, high = band
@@ -83,7 +83,7 @@ def lines(
         look: dict[str, Any] = {"line_color": INKS[key.ink][0], "line_width": 2, "line_dash": DASHES[key.form]}
         drawn = plot.line("x", "y", source=source, **look)
         drawn.tags = [key.ink]
-        if source.data["x"].size < 3:
+        if len(source.data["x"]) < 3:
             points = plot.scatter("x", "y", source=source, size=8, fill_color=look["line_color"], line_color=None)
             points.tags = [key.ink]
         tips = [(_plain(key.label), "@y{%.4g}"), (_plain(x_label), "@x{%.4g}")]
@@ -109,7 +109,7 @@ def bars(
     from bokeh.models import ColumnDataSource, DataRange1d, FactorRange, HoverTool, Span
 
     shown = [_plain(name) for name in names]
-    plot = _plot(x_label, "", y_range=FactorRange(*reversed(shown)), height=90 + 26 * len(names))
+    plot = _plot(x_label, "", y_range=FactorRange(factors=shown[::-1]), height=90 + 26 * len(names))
     if all(np.min(values, initial=0.0) >= 0 for _, values in parts):
         plot.x_range = DataRange1d(start=0.0)
     left: NDArray[np.float64] = np.zeros(len(names))

@@ -63,8 +63,8 @@ def wind(found: ResultsFolder) -> Section | None:
         mean, key = columns["mean_m_s"], Key("mean", "mean")
         curves, band = [(key, mean)], None
         if sigma := columns.get("standard_deviation_m_s"):
-            ends = [[m + side * s for m, s in zip(mean, sigma, strict=True)] for side in (-1, 1)]
-            band = Key("mean ± sigma", curve_ink(k), "band"), *ends
+            low, high = ([m + side * s for m, s in zip(mean, sigma, strict=True)] for side in (-1, 1))
+            band = Key("mean ± sigma", curve_ink(k), "band"), low, high
         what = "wind" if name == "wind" else f"{name} wind"
         parts.append(
             lines(

@@ -239,7 +239,7 @@ def _item(part: Figure, place: str) -> dict[str, Any]:
 
     document = Document()
     document.add_root(part.model)
-    written = document.to_json(deferred=False)
+    written: dict[str, Any] = {**document.to_json(deferred=False)}
     return {"target_id": place, "root_id": part.model.id, "doc": written, "version": written["version"]}
 
 

@@ -6,6 +6,7 @@ import csv
 from pathlib import Path
 
 import pandas as pd
+import pytest
 import xarray as xr
 from scipy.io import loadmat
 
@@ -48,8 +49,7 @@ def opens_as_a_sheet(file: Path) -> pd.DataFrame:
 
 def opens_in_excel(file: Path, folder: Path) -> None:
     """Write the sheet that Excel makes of a CSV file by openpyxl, and read the same numbers from it."""
-    import openpyxl
-
+    openpyxl = pytest.importorskip("openpyxl")
     frame = opens_as_a_sheet(file)
     book = folder / f"{file.stem}.xlsx"
     frame.to_excel(book, index=False)

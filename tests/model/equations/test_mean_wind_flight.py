@@ -17,6 +17,7 @@ from ascentwind.model.vehicle.mean_wind import with_biased_programme as biased
 from ascentwind.model.vehicle.reader import load_vehicle
 from ascentwind.model.vehicle.shipped import built_in_vehicles
 from ascentwind.model.vehicle.vehicle import Vehicle
+from ascentwind.model.wind.statistics import WindModel
 from ascentwind.runners import Study
 from ascentwind.runners.solvers.mean_response import mean_response
 from ascentwind.runners.views.trajectory_angle import air_speed_in_words
@@ -34,6 +35,7 @@ def matrices(study: Study, time: float) -> dict:
 
 def along(vehicle: Vehicle, speed: float) -> Vehicle:
     """The same wind at all altitudes, along the heading of a vehicle in pitch."""
+    assert isinstance(vehicle.wind, WindModel)
     mean = replace(vehicle.wind.mean, values=np.full_like(vehicle.wind.mean.values, speed))
     return replace(vehicle, wind=replace(vehicle.wind, mean=mean))
 
@@ -71,9 +73,10 @@ def test_angles_in_the_mean_wind_are_those_of_the_triangle(wind):
         wind_state = [k for k, name in enumerate(study.system.state_names) if name.startswith("wind")]
         H = plain.wind.shaping_filter.at(float(plain.tables["altitude"].polynomial(time)))[2]
         np.testing.assert_allclose(m["C"][row, wind_state], climb / air**2 * H, rtol=1e-6)
-    step = 1e-4
-    turned = [np.arctan2(w * np.sin(gamma), V - w * np.cos(gamma)) for w in (wind - step, wind + step)]
-    assert (turned[1] - turned[0]) / (2 * step) == pytest.approx(V * np.sin(gamma) / np.hypot(*path) ** 2, rel=1e-6)
+        step = 1e-4
+        turned = [np.arctan2(w * np.sin(gamma), V - w * np.cos(gamma)) for w in (wind - step, wind + step)]
+        slope = V * np.sin(gamma) / np.hypot(*path) ** 2
+        assert (turned[1] - turned[0]) / (2 * step) == pytest.approx(slope, rel=1e-6)
 
 
 def test_a_wind_across_the_heading_raises_the_speed_of_both_planes():

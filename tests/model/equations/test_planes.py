@@ -89,7 +89,7 @@ def test_azimuth_zero_with_a_deviation_each_is_the_plane_alone_to_rounding(plane
     columns = [given.names.index(f"{plane}.{name}") for name in one.groups[at].names]
     mean = replace(one.groups[at], coefficients=given.coefficients[:, :, columns])
     one = one.with_numbers(groups=(*one.groups[:at], mean, *one.groups[at + 1 :]))
-    names = ("A", "B", "C", "E", "G", "inputs")
+    names: tuple[str, ...] = ("A", "B", "C", "E", "G", "inputs")
     systems = [(s, MatrixEvaluator(s, names)) for s in (both, one)]
     first = 0 if component == "zonal" else 3
 
@@ -104,7 +104,9 @@ def test_azimuth_zero_with_a_deviation_each_is_the_plane_alone_to_rounding(plane
     inputs = [joint.system.input_names.index(f"wind_{component}"), joint.system.input_names.index("undisturbed_flight")]
     start, end = alone.system.start, alone.system.end
     for time in TIMES:
-        found, expected = (dict(zip(names, evaluate(time, start, end), strict=True)) for _, evaluate in systems)
+        found, expected = (
+            dict[str, np.ndarray](zip(names, evaluate(time, start, end), strict=True)) for _, evaluate in systems
+        )
         for name, rows, cols in (("A", states, states), ("C", of_plane, states), ("E", states, inputs)):
             wanted = expected[name][outputs] if name == "C" else expected[name]
             scale = np.abs(wanted).max()
@@ -121,7 +123,7 @@ def classical(system, evaluate, stop: float, rows: list[int], step: float = 0.01
     """Mean and standard deviation of outputs at a time by the classical Runge-Kutta formula with equal steps."""
     low, high = system.system.start, system.system.end
     sources = system.system.sources
-    P = sum(system.system.start_covariance_matrix(source, system.parameters) for source in sources)
+    P = np.sum([system.system.start_covariance_matrix(source, system.parameters) for source in sources], axis=0)
     x = np.zeros(P.shape[0])
 
     def rate(at, P, x):

@@ -78,12 +78,12 @@ def test_a_month_of_both_planes_is_what_a_study_in_that_wind_says(cache):
     both = aw.Study.from_vehicle(vehicle)
     found = both.availability(limits, months=["february"], azimuths=[azimuth], window=WINDOW, draws=4000)
     (month,) = read_months(None, ["february"])
-    parts = [
+    zonal, meridional = (
         WindModel(Table(old.name, "m/s", month.altitude, mean, "pchip"), part)
         for old, mean, part in zip(vehicle.wind.means, month.mean, (month.zonal, month.meridional), strict=True)
-    ]
+    )
     filters = TwoComponentFilter(month.zonal, month.meridional, month.noise_correlation, month.start_correlation)
-    study = aw.Study.from_vehicle(replace(vehicle, wind=TwoComponentWind(*parts, filters)))
+    study = aw.Study.from_vehicle(replace(vehicle, wind=TwoComponentWind(zonal, meridional, filters)))
     study = study.with_parameters({"wind.azimuth": azimuth})
     wanted = study.limit_passage(limits, WINDOW, draws=4000).probability
     spread = np.hypot(wanted.standard_error, float(found["standard_error"][0, 0]))

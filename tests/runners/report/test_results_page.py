@@ -91,7 +91,8 @@ def test_curves_hold_the_numbers_of_the_file(folder):
     data = re.search(r'<script type="application/json" id="figures">(.*?)</script>', page_of(folder).html(), re.S)
     assert data is not None
     documents = [Document.from_json(item["doc"]) for item in json.loads(data[1])]
-    sources = [s for d in documents for root in d.roots for s in root.select({"type": ColumnDataSource})]
+    found = [s for d in documents for root in d.roots for s in root.select({"type": ColumnDataSource})]
+    sources = [s for s in found if isinstance(s, ColumnDataSource)]
     arrays = [np.asarray(s.data["y"]) for s in sources if "y" in s.data]
     statistics = lag().response_statistics(TIMES)
     wanted = (statistics.mean - 3 * statistics.std).sel(source="combined", response="x").values

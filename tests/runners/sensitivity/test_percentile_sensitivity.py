@@ -8,11 +8,11 @@ import casadi as ca
 import numpy as np
 import pytest
 from lag import lag
-from scipy.optimize import brentq
 
 import ascentwind as aw
 from ascentwind.model import define_system
 from ascentwind.model.errors import ParameterValueError, PlanesError, TimeRangeError, UnknownNameError
+from ascentwind.runners.flight_load.probability import root_between
 from ascentwind.runners.sensitivity.derivative_figures import heading
 from ascentwind.runners.station_loads.loads_along_vehicle import resultant_along_vehicle
 
@@ -85,7 +85,7 @@ def swelling(cache) -> aw.Study:
 def test_the_peak_of_a_level_between_output_times(swelling):
     """Rayleigh's level sigma sqrt(-2 ln p) is largest where 1 / 2 t + (pi / 2) / tan(pi t / 2) vanishes."""
     found = swelling.percentile_sensitivity("resultant_load", "peak", 0.01)
-    time = brentq(lambda t: 0.5 / t + 0.5 * np.pi / np.tan(0.5 * np.pi * t), 1.0, 1.9)
+    time = root_between(lambda t: 0.5 / t + 0.5 * np.pi / np.tan(0.5 * np.pi * t), 1.0, 1.9, 1e-12)
     assert found.attrs["t2_s"] == pytest.approx(time, abs=1e-4)
     level = 3.0 * np.sqrt(time) * np.sin(np.pi * time / 2) * np.sqrt(-2 * np.log(0.01))
     assert found.attrs["value"] == pytest.approx(level, rel=1e-7)

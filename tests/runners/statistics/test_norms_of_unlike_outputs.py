@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -99,7 +100,7 @@ def test_what_has_no_norm_is_refused_by_name(study, asked):
 
 
 EYE = np.eye(2)
-NUMBERS: dict[str, tuple[object, object, str]] = {
+NUMBERS: dict[str, tuple[Any, Any, str]] = {
     "three components": (np.zeros(3), np.eye(3), "shapes"),
     "a mean of other shape": (np.zeros((4, 2)), EYE, "shapes"),
     "a variance alone": (np.zeros(2), np.ones(2), "shapes"),

@@ -35,7 +35,7 @@ def test_both_sides_are_drawn_and_curves_follow_jumps(as504):
     part = drawn.sel(response="axial_force", source="combined")
     for sign, label in ((3, "mean + 3σ, all sources"), (-3, "mean - 3σ, all sources")):
         expected = (part.mean + sign * part.std) / 1e6
-        np.testing.assert_allclose(lines[label].get_ydata(), expected, rtol=1e-12)
+        np.testing.assert_allclose(np.asarray(lines[label].get_ydata()), expected, rtol=1e-12)
     mean = np.asarray(lines["mean"].get_ydata())
     at = int(np.argmax(np.abs(np.diff(mean))))
     assert times[at] == pytest.approx(134.34, abs=1e-9)
@@ -64,4 +64,4 @@ def test_zero_is_drawn_where_it_is_near(as504):
     statistics = as504.response_statistics([60.0, 75.0, 90.0]).dataset
     for response, near in (("bending_moment", True), ("axial_force", False)):
         (axes,) = response_figure(statistics, response, "AS-504").axes
-        assert any(list(line.get_ydata()) == [0, 0] for line in axes.lines) == near
+        assert any(np.array_equal(np.asarray(line.get_ydata()), [0, 0]) for line in axes.lines) == near
