@@ -146,7 +146,9 @@ def _mended(data: Mapping[str, Any], model: type[File]) -> File | None:
 def _inside(data: Any, path: Sequence[int | str]) -> Any:
     """Return what stands at a path, None where nothing does."""
     for part in path:
-        known = data if isinstance(data, dict) else dict(enumerate(data)) if isinstance(data, list) else {}
+        known: dict[Any, Any] = (
+            data if isinstance(data, dict) else dict(enumerate(data)) if isinstance(data, list) else {}
+        )
         if part not in known:
             return None
         data = known[part]

@@ -93,7 +93,7 @@ def test_curves_hold_the_numbers_of_the_file(folder):
     documents = [Document.from_json(item["doc"]) for item in json.loads(data[1])]
     found = [s for d in documents for root in d.roots for s in root.select({"type": ColumnDataSource})]
     sources = [s for s in found if isinstance(s, ColumnDataSource)]
-    arrays = [np.asarray(s.data["y"]) for s in sources if "y" in s.data]
+    arrays = [np.asarray(s.data["y"]) for s in sources if "y" in s.column_names]
     statistics = lag().response_statistics(TIMES)
     wanted = (statistics.mean - 3 * statistics.std).sel(source="combined", response="x").values
     assert any(a.shape == wanted.shape and np.allclose(a, wanted, rtol=1e-12) for a in arrays)
