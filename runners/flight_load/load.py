@@ -31,9 +31,9 @@ from .norms import Norms, Process
 from .passage import LimitedLoad, Passage
 from .pathwise import Movement, Reaching, movement, reaching
 from .probability import Estimate, Level, estimate, find_level
-from .process import ManyOutputs
+from .process import JointOutputs, ManyOutputs
 from .request import SpacingWarning, checked_draws, checked_level, refuse_without_variance
-from .response import STEPS, ResponseInWindow, squared_diffusion
+from .response import HALVINGS, STEPS, ResponseInWindow, squared_diffusion
 from .sampling import draw_beyond, instant_levels, sighted_steps, steps_near
 from .sensitivity import level_sensitivity
 from .uncertain_parameter import checked_spread, processes_of, uncertain_level
@@ -44,6 +44,8 @@ from .window import checked_window
 DESIGN = 0.00135  # 1 - Phi(3): with this chance an instant passes mean + 3 sigma
 MOST_STEPS = 9600
 SPACING_ERROR = 0.02  # relative, of a probability; finer where it is larger
+FREEDOM = 0.03  # of a variance
+SCATTER = 6.0  # of a probability; 2 where paths are drawn well beyond a level
 DRAWS = 2000
 MOVED = 8000  # draws of paths that just reach a level, of which derivatives are made
 BINS = 60  # of the time of the maximum
@@ -289,6 +291,34 @@ class FlightLoad:
         """The largest of these errors without what may be the draws' own noise."""
         found = [level.probability for level in self.levels]
         return max(each.spacing_error - each.spacing_noise for each in found)
+
+    @property
+    def freedom(self) -> float:
+        """By how much of a variance paths are drawn too freely between points where flights pass a level, at most.
+
+        That of a fast oscillation on a grid that is coarse against its period; its crests then are too many.
+        """
+        found = [0.0]
+        for process, level in zip(self.processes, self.levels, strict=True):
+            outputs = process.of if isinstance(process, Norms) else process
+            where = level.draws.places(level.boundary).sum(axis=(1, 2))
+            if isinstance(outputs, JointOutputs) and outputs.halvings and where.any():
+                found.append(float(where @ outputs.freedom / where.sum()))
+        return max(found)
+
+    @property
+    def scatter(self) -> float:
+        """Standard deviation of what one path drawn says of a probability, by the probability, at most.
+
+        Large where paths do not come near the level: there the grid drawn sees nothing of what lies between its points.
+        """
+        found = [level.probability for level in self.levels]
+        return max(p.standard_error / p.value * np.sqrt(self.draws) if p.value > 0 else np.inf for p in found)
+
+    @property
+    def is_coarse(self) -> bool:
+        """Whether the grid of times is too coarse for the levels."""
+        return self.spacing_missed > SPACING_ERROR or self.freedom > FREEDOM or self.scatter > SCATTER
 
     def probability(self, value: float) -> Estimate:
         """Return the probability that the flight's maximum passes a value.
@@ -599,12 +629,22 @@ def flight_load(
         raise ParameterValueError(f"'{name}' is a resultant, which has no {sided} side; ask with sides='both'")
     load = FlightLoad(asked_of, asked, sided, draws, seed, limits)
     refuse_without_variance(name, load.processes[0])
-    while (missed := load.spacing_missed) > SPACING_ERROR and load.of.steps < MOST_STEPS:
+    while load.is_coarse and load.of.steps < MOST_STEPS:
         load = replace(load, of=replace(load.of, steps=2 * load.of.steps))
-    if missed > SPACING_ERROR:
-        text = (
-            f"the grid of {load.of.steps} steps still misses about {100 * missed:.2g} % of the probability that "
-            f"'{name}' passes its level; ask for a shorter window"
-        )
-        warnings.warn(SpacingWarning(text), stacklevel=3)
+    if load.is_coarse:
+        warnings.warn(SpacingWarning(_coarse_in_words(load)), stacklevel=3)
     return load
+
+
+def _coarse_in_words(load: FlightLoad) -> str:
+    step = (load.window[1] - load.window[0]) / load.of.steps
+    found = f"the grid of {load.of.steps} steps is coarse for the probability that '{load.response}' passes its level: "
+    missed = f"it misses about {100 * load.spacing_missed:.2g} % of it" if load.spacing_missed > SPACING_ERROR else ""
+    fast = ""
+    if load.freedom > FREEDOM or load.scatter > SCATTER:
+        error = 100 * load.scatter / np.sqrt(load.draws)
+        fast = (
+            f"'{load.response}' swings within steps of {2**HALVINGS * step:.2g} s, so that it may be too large, and is "
+            f"known to {error:.2g} % only"
+        )
+    return found + ", and ".join(filter(None, (missed, fast))) + "; ask for a shorter window"

@@ -84,11 +84,15 @@ class Halving:
         Of the deviations there.
     spread : (k, r, r) array
         A root of the covariance that remains.
+    freedom : (k,) array
+        By how much of a variance the covariance of a new point with the next is off, each being drawn by itself from
+        its own neighbours: of a fast oscillation on too coarse a grid, crests lose what joins them.
     """
 
     neighbours: NDArray[np.intp]
     weight: NDArray[np.float64]
     spread: NDArray[np.float64]
+    freedom: NDArray[np.float64]
 
     def between(
         self,
@@ -162,6 +166,15 @@ class JointOutputs:
     def stride(self) -> int:
         """Steps of the grid seen in one of the grid drawn."""
         return 2 ** len(self.halvings)
+
+    @cached_property
+    def freedom(self) -> NDArray[np.float64]:
+        """The largest part of a variance by which halvings are off near each point seen, (m',)."""
+        found = np.zeros(self.seen.times.size)
+        for halving in self.halvings:
+            share = (found.size - 1) // halving.freedom.size
+            found[:-1] = np.maximum(found[:-1], np.repeat(halving.freedom, share))
+        return found
 
     @cached_property
     def std(self) -> NDArray[np.float64]:
@@ -380,7 +393,13 @@ def _halving(band: NDArray[np.float64], stride: int) -> Halving:
     weight = np.linalg.solve(correlation, (k / unit[:, None]).swapaxes(1, 2)).swapaxes(1, 2) / unit[:, None]
     remains = own - weight @ k.swapaxes(1, 2)
     spread = symmetric_root(remains) if r > 1 else np.sqrt(np.maximum(remains, 0.0))
-    return Halving(neighbours, weight.reshape(last, r, count, r).swapaxes(1, 2), spread)
+    both = covariance(old[1:, :, None], old[:-1, None, :]).swapaxes(2, 3).reshape(last - 1, count * r, count * r)
+    off = covariance(middle[1:], middle[:-1]) - weight[1:] @ both @ weight[:-1].swapaxes(1, 2)
+    std = np.sqrt(np.maximum(np.einsum("mrr->mr", own), 0.0))
+    size = std[1:, :, None] * std[:-1, None, :]
+    freedom = np.divide(np.abs(off), size, out=np.zeros_like(off), where=size > 0).max(axis=(1, 2), initial=0.0)
+    freedom = np.append(freedom, freedom[-1:] if last > 1 else 0.0)
+    return Halving(neighbours, weight.reshape(last, r, count, r).swapaxes(1, 2), spread, freedom)
 
 
 def _diffusion(direct: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from scipy.stats import norm
 from ascentwind.model import define_system
 from ascentwind.model.errors import ParameterValueError
 from ascentwind.runners import Study
+from ascentwind.runners.flight_load.request import SpacingWarning
 from ascentwind.runners.flight_load.upcrossings import NotDifferentiableError
 from ascentwind.runners.statistics.percentiles import Sides
 
@@ -117,3 +120,33 @@ def test_the_engine_angle_of_as504_is_bounded_and_the_others_are_rough(as504):
     for name in ("bending_moment", "angle_of_attack"):
         with pytest.raises(NotDifferentiableError):
             as504.flight_load(name, (40.0, 100.0), 0.01, draws=200).upcrossing_rate(1.0)
+
+
+def oscillation(frequency: float) -> Study:
+    """A stationary oscillation of one rad/s after another, sigma 1, damped so much that its crests hardly clump."""
+    t, x, v, n = (ca.SX.sym(s) for s in ("t", "x", "v", "n"))
+    rate = -0.2 * frequency * v - frequency**2 * x + np.sqrt(0.4 * frequency**3) * n
+    return Study.from_system(
+        define_system(
+            "oscillation",
+            time=t,
+            states={"x": (x, v), "v": (v, rate)},
+            noises={"n": n},
+            outputs={"y": x},
+            start_covariance={"n": np.diag([1.0, frequency**2])},
+            end=120.0,
+        )  # fmt: skip
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("frequency, end, told", [(20.0, 40.0, False), (130.0, 20.0, False), (130.0, 40.0, True)])
+def test_a_fast_oscillation_is_resolved_or_told(frequency, end, told):
+    """Rice: a level u is crossed w / 2 pi exp(-u^2 / 2) times a second, passed nearly as often; no level is higher."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        load = oscillation(frequency).flight_load("y", (10.0, end), 1e-3, sides="upper")
+    said = [w for w in caught if issubclass(w.category, SpacingWarning) and "swings within steps" in str(w.message)]
+    assert bool(said) == told
+    crossed = np.sqrt(2 * np.log(frequency / (2 * np.pi) * (end - 10.0) / 1e-3))
+    assert load.level.item() == pytest.approx(crossed, rel=0.05 if told else 0.006)
