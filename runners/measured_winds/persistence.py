@@ -134,5 +134,10 @@ class ComponentPersistence:
         Returns
         -------
         (2, N) array
+
+        Raises
+        ------
+        ValueError
+            A wavelength that is no number.
         """
         return np.array([p.correlation(w, hours) for p, w in zip(self.parts, np.asarray(wavelength), strict=True)])

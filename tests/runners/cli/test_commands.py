@@ -101,7 +101,7 @@ def test_every_command_with_changes_is_tried():
 def test_changes_change_what_is_printed():
     def state_matrix(*typed: str) -> list:
         printed = CliRunner().invoke(app, ["inspect", "as504", "--time", "75", "--json", *typed])
-        return json.loads(printed.output)
+        return json.loads(printed.stdout)
 
     assert state_matrix() != state_matrix("--set", "options.full_coupling=true")
 

@@ -74,7 +74,7 @@ def test_normality_of_soundings(winds, tmp_path, monkeypatch, capsys):
     out = tmp_path / "normal"
     assert run(monkeypatch, "wind", "stats", "--soundings", winds, "--component", "zonal", "--normality", out) == 0
     assert "skewness" in capsys.readouterr().out
-    assert {p.name for p in out.iterdir()} == {"normality.png", "normality.svg"}
+    assert {p.name for p in out.iterdir()} == {"normality.png", "normality.svg", "manifest.json"}
 
 
 def test_both_components_of_soundings_are_applied(winds, tmp_path, monkeypatch):

@@ -114,7 +114,7 @@ KNOWN = {
     "cache": {"clean"},
     "verify": {"times", "runs", "seed", "out", "turbulence", "changes"},
     "tolerance": {"times", "out", "changes"},
-    "sensitivity": {"response", "time", "source", "quantity", "out", "turbulence", "changes"},
+    "sensitivity": {"response", "time", "source", "quantity", "probability", "out", "turbulence", "changes"},
     "equations": {"of", "by", "page", "changes"},
     "study": {"out", "scheduler"},
     "mean": {"out", "changes"},

@@ -126,17 +126,11 @@ def oscillation(frequency: float) -> Study:
     """A stationary oscillation of one rad/s after another, sigma 1, damped so much that its crests hardly clump."""
     t, x, v, n = (ca.SX.sym(s) for s in ("t", "x", "v", "n"))
     rate = -0.2 * frequency * v - frequency**2 * x + np.sqrt(0.4 * frequency**3) * n
-    return Study.from_system(
-        define_system(
-            "oscillation",
-            time=t,
-            states={"x": (x, v), "v": (v, rate)},
-            noises={"n": n},
-            outputs={"y": x},
-            start_covariance={"n": np.diag([1.0, frequency**2])},
-            end=120.0,
-        )  # fmt: skip
-    )
+    system = define_system(
+        "oscillation", time=t, states={"x": (x, v), "v": (v, rate)}, noises={"n": n}, outputs={"y": x},
+        start_covariance={"n": np.diag([1.0, frequency**2])}, end=120.0,
+    )  # fmt: skip
+    return Study.from_system(system)
 
 
 @pytest.mark.slow
