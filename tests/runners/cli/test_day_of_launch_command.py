@@ -41,7 +41,7 @@ def test_the_page_says_go_and_why(cache, files, monkeypatch, capsys):
         assert found["bending_moment_mean"].attrs["units"] == "N m"
         assert np.isfinite(found["bending_moment_std"]).all()
     assert run(monkeypatch, files, "--threshold", "1e-9", "--lasts", "40") == 0
-    assert " ".join(capsys.readouterr().out.split()).startswith("NO-GO: AS-504")
+    assert "NO-GO: AS-504" in " ".join(capsys.readouterr().out.split())
 
 
 @pytest.mark.parametrize(
