@@ -31,7 +31,7 @@ from .norms import Norms, Process
 from .passage import LimitedLoad, Passage
 from .pathwise import Movement, Reaching, movement, reaching
 from .probability import Estimate, Level, estimate, find_level
-from .process import JointOutputs, ManyOutputs
+from .process import ManyOutputs
 from .request import SpacingWarning, checked_draws, checked_level, refuse_without_variance
 from .response import HALVINGS, STEPS, ResponseInWindow, squared_diffusion
 from .sampling import draw_beyond, instant_levels, sighted_steps, steps_near
@@ -45,7 +45,6 @@ DESIGN = 0.00135  # 1 - Phi(3): with this chance an instant passes mean + 3 sigm
 MOST_STEPS = 9600
 SPACING_ERROR = 0.02  # relative, of a probability; finer where it is larger
 FREEDOM = 0.03  # of a variance
-SCATTER = 6.0  # of a probability; 2 where paths are drawn well beyond a level
 DRAWS = 2000
 MOVED = 8000  # draws of paths that just reach a level, of which derivatives are made
 BINS = 60  # of the time of the maximum
@@ -298,27 +297,25 @@ class FlightLoad:
 
         That of a fast oscillation on a grid that is coarse against its period; its crests then are too many.
         """
-        found = [0.0]
+        found = []
         for process, level in zip(self.processes, self.levels, strict=True):
-            outputs = process.of if isinstance(process, Norms) else process
             where = level.draws.places(level.boundary).sum(axis=(1, 2))
-            if isinstance(outputs, JointOutputs) and outputs.halvings and where.any():
-                found.append(float(where @ outputs.freedom / where.sum()))
+            found.append(float(where @ process.freedom) / max(float(where.sum()), np.finfo(float).tiny))
         return max(found)
 
     @property
-    def scatter(self) -> float:
-        """Standard deviation of what one path drawn says of a probability, by the probability, at most.
+    def is_fast(self) -> bool:
+        """Whether the response moves too much within a step drawn.
 
-        Large where paths do not come near the level: there the grid drawn sees nothing of what lies between its points.
+        Paths are drawn too freely between points, or so few of those that come near a level reach it that the interval
+        of a probability begins at zero.
         """
-        found = [level.probability for level in self.levels]
-        return max(p.standard_error / p.value * np.sqrt(self.draws) if p.value > 0 else np.inf for p in found)
+        return self.freedom > FREEDOM or any(level.probability.interval[0] == 0 for level in self.levels)
 
     @property
     def is_coarse(self) -> bool:
         """Whether the grid of times is too coarse for the levels."""
-        return self.spacing_missed > SPACING_ERROR or self.freedom > FREEDOM or self.scatter > SCATTER
+        return self.spacing_missed > SPACING_ERROR or self.is_fast
 
     def probability(self, value: float) -> Estimate:
         """Return the probability that the flight's maximum passes a value.
@@ -637,14 +634,16 @@ def flight_load(
 
 
 def _coarse_in_words(load: FlightLoad) -> str:
-    step = (load.window[1] - load.window[0]) / load.of.steps
-    found = f"the grid of {load.of.steps} steps is coarse for the probability that '{load.response}' passes its level: "
-    missed = f"it misses about {100 * load.spacing_missed:.2g} % of it" if load.spacing_missed > SPACING_ERROR else ""
-    fast = ""
-    if load.freedom > FREEDOM or load.scatter > SCATTER:
-        error = 100 * load.scatter / np.sqrt(load.draws)
-        fast = (
+    step, reasons = (load.window[1] - load.window[0]) / load.of.steps, []
+    if load.spacing_missed > SPACING_ERROR:
+        reasons.append(f"it misses about {100 * load.spacing_missed:.2g} % of it")
+    if load.is_fast:
+        error = max(level.probability.standard_error / level.probability.value for level in load.levels)
+        reasons.append(
             f"'{load.response}' swings within steps of {2**HALVINGS * step:.2g} s, so that it may be too large, and is "
-            f"known to {error:.2g} % only"
+            f"known to {100 * error:.2g} % only"
         )
-    return found + ", and ".join(filter(None, (missed, fast))) + "; ask for a shorter window"
+    return (
+        f"the grid of {load.of.steps} steps is coarse for the probability that '{load.response}' passes its level: "
+        f"{', and '.join(reasons)}; ask for a shorter window"
+    )

@@ -98,6 +98,11 @@ class Norms:
         """How far a path goes between two points drawn without being seen at either, (m, r)."""
         return np.linalg.norm(_pairs(self.of.between), axis=2)
 
+    @property
+    def freedom(self) -> Array:
+        """The largest part of a variance by which halvings are off near each point seen, (m',)."""
+        return self.of.freedom
+
     def restricted(self, points: slice, outputs: NDArray[np.intp]) -> Norms | None:
         """Return the process at some consecutive points drawn and of some norms; None where that saves nothing."""
         both = (2 * outputs[:, None] + np.arange(2)).ravel()

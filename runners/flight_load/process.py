@@ -286,9 +286,9 @@ def joint_outputs(
 
 
 def joint_covariance(
-    chain: MarkovChain, row: NDArray[np.float64], sources: Sequence[int] | None = None
+    chain: MarkovChain, row: NDArray[np.float64], sources: Sequence[int] | None = None, stride: int = 1
 ) -> NDArray[np.float64]:
-    """Return the covariance of outputs between all times of a chain, (m, r, m, r).
+    """Return the covariance of outputs between every so many times of a chain, (m, r, m, r).
 
     Parameters
     ----------
@@ -297,8 +297,9 @@ def joint_covariance(
         Of the outputs over the states.
     sources : sequence of int, optional
         Numbers of those that act; all without it.
+    stride : int
     """
-    return _joint_covariance(chain, row, chain.covariance(sources), 1)
+    return _joint_covariance(chain, row, chain.covariance(sources), stride)
 
 
 def _joint_covariance(
@@ -393,13 +394,18 @@ def _halving(band: NDArray[np.float64], stride: int) -> Halving:
     weight = np.linalg.solve(correlation, (k / unit[:, None]).swapaxes(1, 2)).swapaxes(1, 2) / unit[:, None]
     remains = own - weight @ k.swapaxes(1, 2)
     spread = symmetric_root(remains) if r > 1 else np.sqrt(np.maximum(remains, 0.0))
-    both = covariance(old[1:, :, None], old[:-1, None, :]).swapaxes(2, 3).reshape(last - 1, count * r, count * r)
-    off = covariance(middle[1:], middle[:-1]) - weight[1:] @ both @ weight[:-1].swapaxes(1, 2)
+    between = covariance(old[1:, :, None], old[:-1, None, :]).swapaxes(2, 3).reshape(last - 1, count * r, count * r)
+    drawn = weight[1:] @ between @ weight[:-1].swapaxes(1, 2)
+    freedom = _freedom(covariance(middle[1:], middle[:-1]), drawn, own)
+    return Halving(neighbours, weight.reshape(last, r, count, r).swapaxes(1, 2), spread, freedom)
+
+
+def _freedom(true: NDArray[np.float64], drawn: NDArray[np.float64], own: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return by how much of a variance (k, r, r) covariances (k - 1, r, r) with the next are off, at most, (k,)."""
     std = np.sqrt(np.maximum(np.einsum("mrr->mr", own), 0.0))
     size = std[1:, :, None] * std[:-1, None, :]
-    freedom = np.divide(np.abs(off), size, out=np.zeros_like(off), where=size > 0).max(axis=(1, 2), initial=0.0)
-    freedom = np.append(freedom, freedom[-1:] if last > 1 else 0.0)
-    return Halving(neighbours, weight.reshape(last, r, count, r).swapaxes(1, 2), spread, freedom)
+    found = np.divide(np.abs(true - drawn), size, out=np.zeros_like(size), where=size > 0).max(axis=(1, 2), initial=0.0)
+    return np.append(found, found[-1:] if found.size else 0.0)
 
 
 def _diffusion(direct: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -469,6 +475,11 @@ class ManyOutputs:
     def instant_covariance(self) -> NDArray[np.float64]:
         """Return the covariance of outputs at each point, (m, r, r)."""
         return self.row @ self._P @ self.row.swapaxes(1, 2)
+
+    @property
+    def freedom(self) -> NDArray[np.float64]:
+        """Zero at each point, (m,): every point that is seen is drawn."""
+        return np.zeros(self.chain.times.size)
 
     @cached_property
     def _roots(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -15,7 +15,7 @@ from ..solvers.markov_chain import MarkovChain
 from ..statistics.norm import NormOfNormal
 from ..statistics.resultants import resultant_pairs
 from .norms import Norms
-from .process import JointOutputs, joint_outputs
+from .process import JointOutputs, joint_covariance, joint_outputs
 from .window import window_chain
 
 HALVINGS = 2  # from the grid of which paths are drawn to the one on which they are seen
@@ -81,15 +81,14 @@ class ResponseInWindow:
     def moments(self, relative_tolerance: float) -> tuple[NDArray[np.float64], ...]:
         """Return mean (m, r), covariance (m, r, m, r) and squared diffusion (m, r, r) on the grid drawn."""
         chain = window_chain(self.case, self.window, self.steps // 2**HALVINGS, relative_tolerance)
-        row, mean = chain.output[:, self.rows], chain.mean[:, self.rows]
-        return mean, joint_outputs(chain, row, mean).covariance, squared_diffusion(chain, row)
+        row = chain.output[:, self.rows]
+        return chain.mean[:, self.rows], joint_covariance(chain, row), squared_diffusion(chain, row)
 
     def share_of(self, sources: Sequence[int]) -> tuple[NDArray[np.float64], ...]:
         """Return covariance and squared diffusion on the grid drawn, as :meth:`moments`, from some sources alone."""
-        chain = self.chain
-        row, mean = chain.output[:, self.rows], chain.mean[:, self.rows]
-        covariance = joint_outputs(chain, row, mean, HALVINGS, sources).covariance
-        return covariance, squared_diffusion(chain, row, sources)[:: 2**HALVINGS]
+        chain, stride = self.chain, 2**HALVINGS
+        row = chain.output[:, self.rows]
+        return joint_covariance(chain, row, sources, stride), squared_diffusion(chain, row, sources)[::stride]
 
     def with_parameters(self, changes: Mapping[str, float]) -> ResponseInWindow:
         """Return the same of a case with other parameter values."""
