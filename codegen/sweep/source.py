@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from ...model.system.linear_system import LinearSystem
+from ..system.functions import known_rate
 from ..system.table_layout import table_layout
 from ..toolchain.c_printer import c_function, c_statements, enumerators
 from ..toolchain.fingerprint import fingerprint
@@ -39,10 +40,9 @@ def sweep_functions(system: LinearSystem) -> SweepFunctions:
     """Derive the functions of a system that its sweep needs."""
     at = [system.time, system.v, system.p]
     inputs = system.input_values
-    known = ca.sparsify(system.E @ inputs) if system.u.numel() else ca.SX(len(system.states), 1)
     direct = ca.densify(system.G @ inputs) if system.u.numel() else ca.SX.zeros(len(system.outputs))
     return SweepFunctions(
-        stage=ca.Function("stage", at, ca.cse([system.A, system.B, known])),
+        stage=ca.Function("stage", at, ca.cse([system.A, system.B, ca.sparsify(known_rate(system))])),
         output=ca.Function("output", at, ca.cse([system.C, direct])),
     )
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .covariance import Rate, compiled_rate, covariance_derivative
+from .covariance import Rate, compiled_rate, interpreted_derivative
 from .executable import ExecutableSystem
-from .functions import MATRICES, state_scales
+from .functions import MATRICES
 
 
 class MatrixEvaluator:
@@ -56,17 +56,13 @@ def covariance_rate(executable: ExecutableSystem) -> Rate:
 
     In C where the system is compiled, by NumPy elsewhere.
     """
-    system, scale = executable.system, state_scales(executable.system)
     if executable.shared_library is not None:
-        n = scale.size
-        size = len(system.sources) * n * (n + 1) // 2 + n
-        return compiled_rate(executable.shared_library, executable.parameters, executable.tables, size)
-    noises = [system.noise_columns(source) for source in system.sources]
+        return compiled_rate(executable.system, executable.shared_library, executable.parameters, executable.tables)
     matrices = MatrixEvaluator(executable, ("A", "B", "E", "inputs"))
+    derivative = interpreted_derivative(executable.system)
 
     def rate(time: float, low: float, high: float, y: NDArray) -> NDArray:
         A, B, E, inputs = matrices(time, low, high)
-        known = (E @ inputs[:, 0]) / scale
-        return covariance_derivative(A * scale / scale[:, None], B / scale[:, None], known, noises, y)
+        return derivative(A, B, E @ inputs[:, 0], y)
 
     return rate

@@ -14,14 +14,13 @@ from ...model.system.linear_system import LinearSystem
 from ...model.system.time_conditions import Stops
 from ...model.tables import TableGroup, run_time_vector, table_values
 from ..toolchain.library import Libraries, Library, Recipe
-from .covariance import compiled_rate, covariance_derivative
+from .covariance import compiled_rate, interpreted_derivative, size_of
 from .functions import (
     MATRICES,
     CoreFunctions,
     SystemFunctions,
     core_functions,
     interpreted_functions,
-    state_scales,
 )
 from .source import c_source, source_fingerprint
 
@@ -194,10 +193,8 @@ def _covariance_rates(
     executable: ExecutableSystem, library: Library, time: float, v: NDArray, random: np.random.Generator
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the right-hand side of the covariance equation at a random y by compiled code, and by NumPy."""
-    system, core, p, scale = executable.system, executable.core, executable.parameters, state_scales(executable.system)
-    noises = [system.noise_columns(source) for source in system.sources]
-    y = random.standard_normal(len(noises) * scale.size * (scale.size + 1) // 2 + scale.size)
-    ours = compiled_rate(library, p, executable.tables, y.size)(time, time, time, y)
-    A = core.state_matrix(time, v, p).full() * scale / scale[:, None]
-    B, known = (part.full() / scale[:, None] for part in core.covariance_inputs(time, v, p))
-    return ours, covariance_derivative(A, B, known[:, 0], noises, y)
+    system, core, p = executable.system, executable.core, executable.parameters
+    y = random.standard_normal(size_of(system))
+    ours = compiled_rate(system, library, p, executable.tables)(time, time, time, y)
+    A, (B, known) = core.state_matrix(time, v, p), core.covariance_inputs(time, v, p)
+    return ours, interpreted_derivative(system)(A.full(), B.full(), known.full()[:, 0], y)

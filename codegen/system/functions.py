@@ -96,11 +96,12 @@ def core_functions(system: LinearSystem) -> CoreFunctions:
         adjoint_quadrature=ca.Function("adjoint_quadrature_core", [*at, adjoint], [quadrature]),
         mean=ca.Function("mean_core", [*at, state], [mean_rate]),
         response=ca.Function("response_core", [*at, system.x], [ca.densify(_without_noise(system, system.output))]),
-        covariance_inputs=ca.Function("covariance_inputs_core", at, [system.B, ca.densify(_known(system))]),
+        covariance_inputs=ca.Function("covariance_inputs_core", at, [system.B, ca.densify(known_rate(system))]),
     )
 
 
-def _known(system: LinearSystem) -> ca.SX:
+def known_rate(system: LinearSystem) -> ca.SX:
+    """Return E u, (n, 1): what known inputs do to the states."""
     return system.E @ system.input_values if system.u.numel() else ca.SX.zeros(len(system.states))
 
 

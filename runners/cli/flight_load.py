@@ -10,7 +10,7 @@ from rich.table import Table
 
 from ...model.errors import AscentwindError, TimeRangeError, UnusedOptionError
 from ...model.files.numbers import parse_number
-from ..present.terminal import console, errors, print_table
+from ..present.terminal import complain, console, print_table
 from .job import Job, load_study, steps
 from .terminal import Changes, Turbulence, VehicleArgument, number, results_folder, whole
 
@@ -235,7 +235,7 @@ def _sensitivities(loads: list[FlightLoad]) -> list[xr.Dataset]:
                 found.append(load.sensitivity())
             except AscentwindError as error:
                 text = f"The derivatives of {load.response} could not be computed, all else stands: {error}"
-                errors.print(text, style="bold red", markup=False, highlight=False, soft_wrap=True)
+                complain(text)
             bar.done(words(load.response))
     return found
 

@@ -10,7 +10,7 @@ import typer
 from rich.table import Table
 
 from ...model.errors import AscentwindError, OutputFolderError, UnusedOptionError
-from ..present.terminal import console, errors, print_table
+from ..present.terminal import complain, console, print_table
 from ..statistics.larger_side import LARGER_SIDE
 from .flight_load import known_loads, print_levels
 from .job import SHOWN, Job, load_study, steps
@@ -256,7 +256,7 @@ def _compute_for_report(study: Study, loads: list[FlightLoad], job: Job) -> None
         except AscentwindError as error:
             text = f"Not all for the report could be computed, all else stands: {error}"
             job.notes.append(text)
-            errors.print(text, style="bold red", markup=False, highlight=False, soft_wrap=True)
+            complain(text)
 
 
 def _print_verdict(text: str, good: bool) -> None:
@@ -282,7 +282,7 @@ def _check_peaks(study: Study, statistics: ResponseStatistics) -> PeakCheck | No
         return check_peaks(study, statistics)
     except AscentwindError as error:
         text = f"The peaks could not be computed a second time, by another road, and stand unchecked: {error}"
-        errors.print(text, style="bold red", markup=False, highlight=False, soft_wrap=True)
+        complain(text)
         return None
 
 
@@ -294,7 +294,7 @@ def _check_resultants(study: Study, both: Resultants) -> ResultantCheck | None:
         return check_resultants(study, both)
     except AscentwindError as error:
         text = f"The resultants could not be computed a second time, by CVODES, and stand unchecked: {error}"
-        errors.print(text, style="bold red", markup=False, highlight=False, soft_wrap=True)
+        complain(text)
         return None
 
 
@@ -315,7 +315,7 @@ def _flight_loads(study: Study, end_times: list[float], probabilities: tuple[flo
                 pass
             except AscentwindError as error:
                 text = f"The flight's level of {name} could not be computed, all else stands: {error}"
-                errors.print(text, style="bold red", markup=False, highlight=False, soft_wrap=True)
+                complain(text)
             bar.done()
     return loads
 

@@ -16,7 +16,7 @@ from ..solvers.adjoint import AdjointSolver
 from ..solvers.integration import CvodesSettings
 from ..statistics.larger_side import larger_side, side
 from ..statistics.peaks_of_resultants import laws_by_adjoint
-from ..statistics.resultants import outputs_of
+from ..statistics.resultants import labels_of, outputs_of
 from ..study import Study
 from .peaks import SIGNS
 from .problem import DesignProblemError, LoadReliefProblem, family_words
@@ -289,8 +289,8 @@ def _quantities(search: Search, before: NDArray[np.float64], after: NDArray[np.f
     problem, points = search.problem, (search.point(before), search.point(after))
     found = []
     for r, response in enumerate(search.responses):
-        of = outputs_of(problem.study, response)
-        unit = problem.study.system.outputs[problem.study.system.output_index(of[0])].unit
+        of = labels_of(problem.study, response)
+        unit = of[0].unit
         largest = [p.peaks[r].max(axis=0) for p in points]
         times = [problem.times[int(np.argmax(x))] for x in largest]
         heights = [float(x.max()) for x in largest]

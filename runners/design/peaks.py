@@ -74,14 +74,19 @@ def gradients(study: Study, rows: Iterable[Row], parameters: tuple[str, ...]) ->
         for response, _, time in rows
         if len(outputs_of(study, response)) == 1
     }
+    of_two: dict[tuple[str, float], NDArray[np.float64]] = {}
+    for response, time in dict.fromkeys((response, time) for response, _, time in rows):
+        if (response, time) in pairs:
+            continue
+        of = outputs_of(study, response)
+        statistics = study.response_statistics([time], responses=of, engine=_engine(study, [response]))
+        by_mean, by_covariance = (part[0] for part in statistics.norm(*of).derivatives(LIKE_3_SIGMA))
+        forms = two_forms(study, flight, of, time, by_mean, by_covariance)
+        of_two[response, time] = np.sum([gradient.parameters[columns] for _, gradient, _ in forms], axis=0)
     found = {}
     for response, sign, time in rows:
-        of = outputs_of(study, response)
-        if len(of) == 2:
-            statistics = study.response_statistics([time], responses=of, engine=_engine(study, [response]))
-            by_mean, by_covariance = (part[0] for part in statistics.norm(*of).derivatives(LIKE_3_SIGMA))
-            forms = two_forms(study, flight, of, time, by_mean, by_covariance)
-            found[response, sign, time] = sign * sum(gradient.parameters[columns] for _, gradient, _ in forms)
+        if (response, time) in of_two:
+            found[response, sign, time] = sign * of_two[response, time]
             continue
         pair = pairs[response, time]
         found[response, sign, time] = gradient_of(pair, 0.5 * SIGMAS / np.sqrt(pair.variance), sign).parameters[columns]

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear, minimize
 
 from ..solvers.frozen_roots import FrozenDamping, FrozenRoots, root_families
-from ..statistics.resultants import outputs_of
+from ..statistics.resultants import labels_of
 from .peaks import SIGNS, Row, gradients, three_sigma
 from .problem import LoadReliefProblem
 
@@ -77,9 +77,7 @@ class Search:
         self._points: dict[bytes, Point] = {}
         self._exact: dict[bytes, dict[Row, NDArray]] = {}
         self._last: dict[str, dict[Row, NDArray]] = {}
-        outputs = problem.study.system.outputs
-        firsts = [outputs_of(problem.study, response)[0] for response in self.responses]
-        sizes = [outputs[problem.study.system.output_index(name)].scale for name in firsts]
+        sizes = [labels_of(problem.study, response)[0].scale for response in self.responses]
         self._fallback = np.array(sizes)[:, None, None] * np.ones((len(self.responses), len(SIGNS), len(problem.times)))
         self.scale = self.height(problem.start)
 

@@ -8,7 +8,7 @@ from matplotlib import rc_context
 from matplotlib.figure import Figure
 
 from ..present.style import SHADES, STYLE, display, words
-from ..statistics.resultants import outputs_of
+from ..statistics.resultants import labels_of, outputs_of
 from .design import TradePoint
 
 
@@ -23,12 +23,9 @@ def trade_figure(trades: Mapping[str, Sequence[TradePoint]], response: str, titl
         Whose peak is limited.
     """
     first = next(p.result for points in trades.values() for p in points if p.result)
-    system = first.problem.study.system
     before = {q.name: q.before for q in first.quantities}
     (up, up_unit), (along, along_unit) = (
-        display(
-            system.outputs[system.output_index(outputs_of(first.problem.study, name)[0])].unit, before[f"peak {name}"]
-        )
+        display(labels_of(first.problem.study, name)[0].unit, before[f"peak {name}"])
         for name in (first.problem.response, response)
     )
     with rc_context(STYLE):

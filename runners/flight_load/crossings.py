@@ -38,6 +38,11 @@ class Boundary:
         nowhere = np.full(limit.shape, np.inf)
         return Boundary(nowhere if sides == "lower" else limit, -nowhere if sides == "upper" else -limit)
 
+    @staticmethod
+    def constant(level: float, grid: Grid, sides: str) -> Boundary:
+        """Return the same level at all points and of all outputs of a grid."""
+        return Boundary.around(np.full(grid.mean.shape, level), sides)
+
     def at(self, points: slice) -> Boundary:
         """Return the boundary at some of its points."""
         return Boundary(self.upper[points], self.lower[points])

@@ -99,7 +99,8 @@ def with_flight_levels(statistics: ResponseStatistics, loads: Sequence[FlightLoa
             for k, (name, label) in enumerate(labels.items())
         }
     window = list(loads[0].window)
-    return ResponseStatistics(statistics.dataset.assign(variables).assign_attrs(flight_level_window_s=window))
+    of = {"flight_level_window_s": window, "flight_level_probability": loads[0].probabilities[0]}
+    return ResponseStatistics(statistics.dataset.assign(variables).assign_attrs(of))
 
 
 def write_sensitivities(found: Sequence[xr.Dataset], folder: Path) -> Path:

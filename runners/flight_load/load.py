@@ -49,6 +49,7 @@ DRAWS = 2000
 MOVED = 8000  # draws of paths that just reach a level, of which derivatives are made
 BINS = 60  # of the time of the maximum
 SIDES = "upper", "lower"
+SIZES = {"both": np.abs, "upper": np.asarray, "lower": np.negative}  # what of a response is large
 WIND_SIGMA = "wind.sigma_scale"
 RUNS = "simulated flights without a failure that would say as much, at a consumer's risk of 10 %"
 
@@ -109,7 +110,7 @@ class FlightLoad:
         return tuple(part.process() if part.is_resultant else self.process for part in self.parts)
 
     def _boundary(self, value: float) -> Boundary:
-        return Boundary.around(np.full(self.process.seen.mean.shape, value), self.sides)
+        return Boundary.constant(value, self.process.seen, self.sides)
 
     def _random(self, *what: int) -> np.random.Generator:
         return np.random.default_rng([self.seed, *what])
@@ -121,10 +122,10 @@ class FlightLoad:
         return tuple(self._level(process, p, self.draws) for process, p in found)
 
     def _level(self, process: Process, probability: float, draws: int) -> Level:
-        size, shape = float((np.abs(process.drawn.mean) + process.std).max()), process.seen.mean.shape
+        size = float((np.abs(process.drawn.mean) + process.std).max())
 
         def boundary(value: float) -> Boundary:
-            return Boundary.around(np.full(shape, value), self.sides)
+            return Boundary.constant(value, process.seen, self.sides)
 
         return find_level(process, probability, boundary, size, self._random(0), draws)
 
@@ -459,9 +460,7 @@ class FlightLoad:
             drawn = process.of.deviations(random, self.draws)
             return drawn, process.sizes(drawn)
         drawn = process.deviations(random, self.draws)
-        return drawn, {"both": np.abs, "upper": np.asarray, "lower": np.negative}[self.sides](
-            process.drawn.mean + drawn
-        )
+        return drawn, SIZES[self.sides](process.drawn.mean + drawn)
 
     def _reaching(self, which: int, stream: int, draws: int) -> Reaching:
         process = self.processes[which]
@@ -527,14 +526,13 @@ class FlightLoad:
             still = np.zeros_like(moved.mean)
             part = np.array([moved.change(still, *self.parts[which].share_of([k])) for k in range(count)])
             share.append(part / part.sum())
-        size_of = {"both": np.abs, "upper": np.asarray, "lower": np.negative}[self.sides]
         for number in range(count):
             others = [k for k in range(count) if k != number]
             levels = []
             for part, p in zip(self.parts, self.probabilities, strict=True):
                 process = part.process(others)
                 varies = float(process.std.max()) > 0
-                still = float(size_of(process.seen.mean).max())
+                still = float(SIZES[self.sides](process.seen.mean).max())
                 levels.append(self._level(process, p, self.draws // 4).value if varies else still)
             without.append(levels)
         dims, unit = ("probability", "source"), self.unit

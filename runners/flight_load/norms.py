@@ -16,11 +16,12 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import log_ndtr, ndtri_exp
+from scipy.special import log_ndtr
 
 from ..solvers.markov_chain import MarkovChain
 from ..statistics.norm import NormOfNormal
 from .crossings import Boundary, Sightings, sighted
+from .mixture import drawn_places
 from .process import Grid, JointOutputs, ManyOutputs, Steps, joint_outputs
 
 Array = NDArray[np.float64]
@@ -151,13 +152,9 @@ class Norms:
         deviations = self.of.deviations(random, count)
         if not np.isfinite(log_sum):  # nothing ever comes near
             return deviations, np.zeros((count, *distance.shape)), np.zeros(count)
-        cumulative = np.cumsum(np.exp(log_p - log_sum).ravel())
-        spread = (np.arange(count) + random.random(count)) / count * cumulative[-1]
-        chosen = np.minimum(np.searchsorted(cumulative, spread, side="right"), cumulative.size - 1)
-        line, point, norm = np.unravel_index(chosen, log_p.shape)
+        (line, point, norm), deviate = drawn_places(log_p, log_sum, random, count)
         e = LINES[line]
         variance = np.einsum("ci,cij,cj->c", e, self.law.covariance[point, norm], e)
-        deviate = -ndtri_exp(log_p[line, point, norm] + np.log1p(-random.random(count)))
         own = np.einsum("ci,ci->c", _pairs(deviations)[np.arange(count), point, norm], e)
         gain = np.divide(deviate * np.sqrt(variance) - own, variance, out=np.zeros(count), where=variance > 0)
         for k in range(2):

@@ -273,7 +273,7 @@ def joint_outputs(
         Numbers of those that act; all without it.
     """
     P = chain.covariance(sources)
-    seen = Grid(chain.times, mean, _diffusion(row @ chain.acting_noise_matrix(sources)))
+    seen = Grid(chain.times, mean, signed_diffusion(row @ chain.acting_noise_matrix(sources)))
     stride = 2**halvings
     at = slice(None, None, stride)
     drawn = Grid(seen.times[at], seen.mean[at], seen.diffusion[at])
@@ -408,7 +408,7 @@ def _freedom(true: NDArray[np.float64], drawn: NDArray[np.float64], own: NDArray
     return np.append(found, found[-1:] if found.size else 0.0)
 
 
-def _diffusion(direct: NDArray[np.float64]) -> NDArray[np.float64]:
+def signed_diffusion(direct: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return sizes of C B (m, r, noises) with the sign of their largest entry, (m, r)."""
     size = np.sqrt((direct**2).sum(axis=2))
     if not direct.shape[2]:
@@ -434,7 +434,7 @@ class ManyOutputs:
 
     @cached_property
     def drawn(self) -> Grid:
-        return Grid(self.chain.times, self.mean, _diffusion(self.row @ self.chain.noise_matrix))
+        return Grid(self.chain.times, self.mean, signed_diffusion(self.row @ self.chain.noise_matrix))
 
     @property
     def seen(self) -> Grid:

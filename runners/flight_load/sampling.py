@@ -15,13 +15,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import log_ndtr, ndtri_exp
+from scipy.special import log_ndtr
 
 from ...codegen.toolchain.interruption import Workers
 from ..solvers.cores import available_cores
 from ..statistics.norm import NormOfNormal
 from ..statistics.percentiles import Sides, instant_level
 from .crossings import Boundary, Sightings, sightings
+from .mixture import drawn_places
 from .norms import Norms, Process
 from .process import Steps
 
@@ -208,12 +209,7 @@ def _paths_beyond(
     deviations = process.deviations(random, count)
     if not np.isfinite(log_sum):  # nothing ever comes near
         return deviations, np.zeros(deviations.shape[:2], bool), np.zeros(count)
-    cumulative = np.cumsum(np.exp(log_p - log_sum).ravel())
-    spread = (np.arange(count) + random.random(count)) / count * cumulative[-1]
-    chosen = np.minimum(np.searchsorted(cumulative, spread, side="right"), cumulative.size - 1)
-    sides, points, outputs = np.unravel_index(chosen, log_p.shape)
-    tail = log_p[sides, points, outputs]
-    deviate = -ndtri_exp(tail + np.log1p(-random.random(count)))  # standard, beyond the boundary on its side
+    (sides, points, outputs), deviate = drawn_places(log_p, log_sum, random, count)
     std = process.std[points, outputs]
     wanted = np.where(sides == 0, 1.0, -1.0) * deviate * std
     own = deviations[np.arange(count), points, outputs]

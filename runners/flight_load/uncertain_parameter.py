@@ -56,7 +56,7 @@ def uncertain_level(
     weights = weights / weights.sum()
 
     def boundary(u: float) -> Boundary:
-        return Boundary.around(np.full(processes[0].seen.mean.shape, u), sides)
+        return Boundary.constant(u, processes[0].seen, sides)
 
     def drawn(start: float) -> list[Draws]:
         return [draw_beyond(process, boundary(start), random, count) for process in processes]

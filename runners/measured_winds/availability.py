@@ -43,7 +43,7 @@ from .day_of_launch import ERROR, MOST_VALUES, matter, worth_while
 from .level_weights import WINDS
 from .limited_loads import LimitedLoads, limited_loads, row_weights, symmetric
 from .other_winds import in_mean_winds
-from .random_wind import RandomWind, filter_wind
+from .random_wind import RandomWind, filter_wind, rows_of_components
 from .wind_field import WindField, default_persistence
 
 STEPS = 1200  # of the window, at most
@@ -216,8 +216,7 @@ def _turns(case: Case, azimuths: Iterable[float] | None) -> tuple[NDArray[np.flo
 def _wind(month: MonthWind, levels: NDArray[np.float64]) -> RandomWind:
     """Return u and v of a month at levels (m)."""
     mean = np.concatenate([month.mean_along(weights, levels) for weights in ((1.0, 0.0), (0.0, 1.0))])
-    zonal = np.arange(month.joint.order) < month.zonal.order
-    return filter_wind(month.joint, levels, mean, np.array([zonal, ~zonal], float))
+    return filter_wind(month.joint, levels, mean, rows_of_components(month.joint.order, month.zonal.order))
 
 
 def _in_mean(case: Case, month: MonthWind, turn: NDArray[np.float64]) -> Case:

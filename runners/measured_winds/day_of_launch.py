@@ -428,13 +428,12 @@ class DayOfLaunch:
         expected = self.wind["mean"].values.reshape(field.components, -1)
 
         def of_day(number: int, levels: NDArray[np.float64]) -> NDArray[np.float64]:
-            season = field.mean_at(np.clip(levels, field.levels[0], field.levels[-1]), number)
             inside = np.clip(levels, field.levels[0], field.levels[-1])
-            return np.interp(inside, field.levels, expected[number]) - season
+            return np.interp(inside, field.levels, expected[number]) - field.mean_at(inside, number)
 
         about = in_mean_winds(flight.case, of_day, added=True)
-        row, _, _ = flight.loads.over(window_chain(about, flight.window, STEPS), about)
         chain = window_chain(about, flight.window, STEPS)
+        row, _, _ = flight.loads.over(chain, about)
         covariance = symmetric(row @ chain.covariance() @ row.swapaxes(1, 2))
         return replace(self, flight=replace(flight, about=about, covariance=covariance))
 

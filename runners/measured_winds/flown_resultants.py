@@ -16,7 +16,7 @@ from ..present.netcdf import RULE
 from ..present.notebook import html_of
 from ..solvers.discretisation import symmetric_root
 from ..statistics.norm import NormOfNormal
-from .profile_statistics import independent_profiles, profile_percentiles, worst_profiles
+from .profile_statistics import independent_profiles, percentile_dataset, worst_profiles
 from .profiles import CompleteProfiles
 
 PERCENTILES = (0.05, 0.5, 0.95, 0.99)
@@ -127,18 +127,9 @@ class FlownResultants:
             ``predicted``, the percentile of the norm in a Gaussian wind of the vehicle's means and filters.
         """
         p = np.array([float(x) for x in probabilities])
-        measured, interval = profile_percentiles(self.completed, self.independent, p)
         laws = [self.law(name) for name in self.pairs]
         predicted = np.stack([[law.percentile(1.0 - x) for law in laws] for x in p]).transpose(0, 2, 1)
-        dims = ("probability", "time", "response")
-        return xr.Dataset(
-            {
-                "measured": (dims, measured, {RULE: "response", "long_name": "percentile of the measured profiles"}),
-                "interval": (("bound", *dims), interval, {RULE: "response", "long_name": "95 % interval of it"}),
-                "predicted": (dims, predicted, {RULE: "response", "long_name": "percentile in a Gaussian wind"}),
-            },
-            {"probability": p, "bound": ["lower", "upper"]} | self._coordinates(),
-        )
+        return percentile_dataset(self.completed, self.independent, predicted, p, self._coordinates())
 
     @cached_property
     def maxima(self) -> NDArray[np.float64]:

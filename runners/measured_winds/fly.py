@@ -29,7 +29,7 @@ from ..statistics.resultants import resultant_pairs
 from .flown_resultants import FlownResultants
 from .level_weights import LevelWeights, level_weights
 from .met_winds import met_winds
-from .profile_statistics import independent_profiles, profile_percentiles, worst_profiles
+from .profile_statistics import independent_profiles, percentile_dataset, worst_profiles
 from .profiles import CompleteProfiles, complete_profiles, soundings_of
 from .random_wind import random_wind
 
@@ -192,19 +192,8 @@ class FlownWinds:
             many independent profiles; ``predicted`` of a Gaussian wind of the vehicle's mean and filter.
         """
         p = np.array([float(x) for x in probabilities])
-        measured, interval = profile_percentiles(self.completed, self.independent, p)
         predicted = self.predicted_mean + ndtri(p)[:, None, None] * self.predicted_std
-        dims = ("probability", "time", "response")
-        return xr.Dataset(
-            {
-                "measured": (dims, measured, {RULE: "response", "long_name": "percentile of the measured profiles"}),
-                "interval": (
-                    ("bound", *dims), interval, {RULE: "response", "long_name": "95 % interval of it"},
-                ),
-                "predicted": (dims, predicted, {RULE: "response", "long_name": "percentile in a Gaussian wind"}),
-            },
-            {"probability": p, "bound": ["lower", "upper"]} | self._coordinates(),
-        )  # fmt: skip
+        return percentile_dataset(self.completed, self.independent, predicted, p, self._coordinates())
 
     @cached_property
     def maxima(self) -> NDArray[np.float64]:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
+from scipy.special import ndtr
 
 from ...model.vehicle.planes import flown_planes
 from ..case.case import Case
@@ -19,7 +19,7 @@ from ..flight_load.limit_table import LimitError, Limits
 from ..flight_load.limits import checked_limits, stations_inside
 from ..flight_load.norms import Norms
 from ..flight_load.passage import LimitedLoad
-from ..flight_load.process import Grid, JointOutputs
+from ..flight_load.process import Grid, JointOutputs, signed_diffusion
 from ..solvers.markov_chain import MarkovChain
 from ..station_loads.loads_along_vehicle import LOADS, load_rows, vehicle_stations
 from ..statistics.norm import NormOfNormal
@@ -167,9 +167,9 @@ class LimitedLoads:
             std = np.sqrt(np.maximum(covariance[:, rows[0], rows[0]], 0.0))
             unit, own = np.where(std > 0, std, 1e-300), mean[:, rows[0]]
             if sides != "lower":
-                found[:, k] += norm.sf((values[:, k] - own) / unit)
+                found[:, k] += ndtr((own - values[:, k]) / unit)
             if sides != "upper":
-                found[:, k] += norm.sf((values[:, k] + own) / unit)
+                found[:, k] += ndtr(-(values[:, k] + own) / unit)
         return found
 
     def beyond(self, values: Array, paths: Array, sides: Sides) -> NDArray[np.bool_]:
@@ -205,10 +205,8 @@ class LimitedLoads:
         """
         if not any(len(limit.rows) == 2 for limit in self.limits):
             rows = [limit.rows[0] for limit in self.limits]
-            size = np.sqrt((direct[:, rows] ** 2).sum(axis=2))
-            largest = np.abs(direct[:, rows]).argmax(axis=2)[..., None]
-            signed = np.copysign(size, np.take_along_axis(direct[:, rows], largest, axis=2)[..., 0])
-            return JointOutputs(Grid(times, mean[:, rows], signed), covariance[:, rows][:, :, :, rows])
+            grid = Grid(times, mean[:, rows], signed_diffusion(direct[:, rows]))
+            return JointOutputs(grid, covariance[:, rows][:, :, :, rows])
         # a response beside resultants is one with nothing
         m, R = mean.shape
         flat = [row for limit in self.limits for row in (*limit.rows, R)[:2]]

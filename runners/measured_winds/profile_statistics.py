@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from ...model.wind.soundings.collection import independent_samples
+from ..present.netcdf import RULE
 from .profiles import CompleteProfiles
 
 CONFIDENCE = 0.95
@@ -48,6 +52,41 @@ def profile_percentiles(
         a, b = (np.take_along_axis(ordered, np.minimum(low + k, n - 1), axis=0) for k in (0, 1))
         ends.append(a + (rank - low) * (b - a))
     return measured, np.array(ends)
+
+
+def percentile_dataset(
+    histories: NDArray[np.float64],
+    independent: NDArray[np.float64],
+    predicted: NDArray[np.float64],
+    probabilities: NDArray[np.float64],
+    coordinates: Mapping[str, object],
+) -> xr.Dataset:
+    """Return percentiles of histories beside predicted ones.
+
+    Parameters
+    ----------
+    histories, independent, probabilities
+        As for :func:`profile_percentiles`.
+    predicted : (p, time, response) array
+    coordinates : mapping
+        Of time and response.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over (probability, time, response): ``measured``, ``interval`` (bound) and ``predicted``.
+    """
+    measured, interval = profile_percentiles(histories, independent, probabilities)
+    dims = ("probability", "time", "response")
+    parts = {
+        "measured": (dims, measured, "percentile of the measured profiles"),
+        "interval": (("bound", *dims), interval, "95 % interval of it"),
+        "predicted": (dims, predicted, "percentile in a Gaussian wind"),
+    }
+    return xr.Dataset(
+        {name: (over, values, {RULE: "response", "long_name": text}) for name, (over, values, text) in parts.items()},
+        {"probability": probabilities, "bound": ["lower", "upper"]} | dict(coordinates),
+    )
 
 
 def worst_profiles(

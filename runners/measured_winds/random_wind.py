@@ -109,8 +109,13 @@ def component_rows(wind: WindModel | TwoComponentWind) -> NDArray[np.float64]:
     """Return which of a filter's states make which of its winds, (c, n), ones and zeros."""
     if isinstance(wind, WindModel):
         return np.ones((1, wind.shaping_filter.order))
-    zonal = np.arange(wind.shaping_filter.order) < wind.zonal.shaping_filter.order
-    return np.array([zonal, ~zonal], float)
+    return rows_of_components(wind.shaping_filter.order, wind.zonal.shaping_filter.order)
+
+
+def rows_of_components(order: int, zonal: int) -> NDArray[np.float64]:
+    """Return which states of a joint filter make which component, (2, order): the first ``zonal`` ones the zonal."""
+    first = np.arange(order) < zonal
+    return np.array([first, ~first], float)
 
 
 def filter_wind(

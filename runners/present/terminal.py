@@ -29,6 +29,11 @@ QUANTITY = re.compile(rf"(?P<value>[+-]?\d+(?:\.\d+)?(?:e[+-]?\d+)?)(?: ?(?P<uni
 EDGES = 3  # of a column: a space on either side and a line
 
 
+def complain(text: str) -> None:
+    """Say what went wrong while all else stands."""
+    errors.print(text, style="bold red", markup=False, highlight=False, soft_wrap=True)
+
+
 def progress_bar() -> Progress:
     """Return a bar that says what is done, how much of it, and for how long."""
     return Progress(

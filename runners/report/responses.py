@@ -54,9 +54,8 @@ def flight_levels(statistics: ResponseStatistics) -> dict[str, tuple[float, floa
 
 def level_meaning(statistics: ResponseStatistics) -> str:
     """Return what the flight's level is, as the beginning of a sentence."""
-    chance = str(statistics.dataset["flight_level"].attrs.get("long_name", "")).rpartition(" ")[2].rstrip(":")
-    begin, end = statistics.attrs["flight_level_window_s"]
-    return f"With probability {chance} the largest value of a whole flight, {begin:g} to {end:g} s,"
+    (begin, end), chance = statistics.attrs["flight_level_window_s"], statistics.attrs["flight_level_probability"]
+    return f"With probability {chance:g} the largest value of a whole flight, {begin:g} to {end:g} s,"
 
 
 def peak_table(statistics: ResponseStatistics) -> list[Part]:

@@ -63,7 +63,7 @@ class Agreement:
         found = []
         for what, differences in (("standard deviation", self.differences), ("mean", self.mean_differences)):
             for engine, values in differences.items():
-                worst = np.unravel_index(np.nanargmax(np.where(np.isnan(values), np.inf, values)), values.shape)
+                worst = np.unravel_index(np.argmax(np.where(np.isnan(values), np.inf, values)), values.shape)
                 if not values[worst] <= LIMIT:
                     found.append(
                         f"{what} by {ENGINES[engine].label} differs by {values[worst]:.1e} in {self._entry(worst)}; "
@@ -82,7 +82,7 @@ class Agreement:
         if of is None:
             return found
         for engine, values in of.differences.items():
-            k, r = np.unravel_index(np.nanargmax(np.where(np.isnan(values), np.inf, values)), values.shape)
+            k, r = np.unravel_index(np.argmax(np.where(np.isnan(values), np.inf, values)), values.shape)
             if not values[k, r] <= LIMIT:
                 found.append(
                     f"mean, covariance or level of {of.resultants[r]} by {ENGINES[engine].label} differs by "

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import binom
+from scipy.special import bdtr, bdtrc
 
 from ..case.case import Case
 from ..solvers.adjoint import AdjointSolver
@@ -58,6 +58,8 @@ class ResultantAgreement:
     @property
     def interval(self) -> tuple[int, int]:
         """Numbers between which as many flights pass as the confidence says, of the binomial law."""
+        from scipy.stats import binom  # takes a third of a second to import
+
         low, high = binom.interval(self.confidence, self.flights, self.probability)
         return int(low), int(high)
 
@@ -70,8 +72,8 @@ class ResultantAgreement:
     def impossible(self, chance: float) -> NDArray[np.bool_]:
         """Return the entries (k, r) that a right result would have with less than a chance, all of them together."""
         each = chance / (2 * self.passed.size)
-        below = binom.cdf(self.passed, self.flights, self.probability)
-        above = binom.sf(self.passed - 1, self.flights, self.probability)
+        below = bdtr(self.passed, self.flights, self.probability)
+        above = np.where(self.passed > 0, bdtrc(self.passed - 1, self.flights, self.probability), 1.0)
         return (below < each) | (above < each)
 
 

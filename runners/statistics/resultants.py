@@ -28,6 +28,7 @@ from .norm import NormOfNormal
 from .percentiles import checked_probabilities
 
 if TYPE_CHECKING:
+    from ...model.system.labels import Output
     from ..case.case import Case
 
 TOTAL = {
@@ -55,6 +56,11 @@ def outputs_of(case: Case, name: str) -> tuple[str, ...]:
     return resultant_pairs(case.system.output_names).get(name, (name,))
 
 
+def labels_of(case: Case, name: str) -> tuple[Output, ...]:
+    """Return what is known of them: unit, scale, symbol."""
+    return tuple(case.system.outputs[case.system.output_index(output)] for output in outputs_of(case, name))
+
+
 def response_or_resultant(case: Case, name: str) -> str:
     """Return the name of a response or of a resultant of two with one unit.
 
@@ -69,7 +75,8 @@ def response_or_resultant(case: Case, name: str) -> str:
     names = case.system.output_names
     pairs = resultant_pairs(names)
     if name in pairs:
-        outputs = [case.system.outputs[case.system.output_index(n)] for n in case.checked_responses(pairs[name])]
+        case.checked_responses(pairs[name])
+        outputs = labels_of(case, name)
         if outputs[0].unit != outputs[1].unit:
             listed = " and ".join(f"'{o.name}' is in {o.unit}" for o in outputs)
             raise ParameterValueError(f"{listed}: they have no norm; choose another resultant")

@@ -12,7 +12,7 @@ from ....model.errors import DataError
 from ..beam.elements import element_flexibilities
 from .deck import Deck, read_deck
 from .mapping import ResultEntry, read_mapping
-from .results import NO_SHAPES, read_results
+from .results import ASK_FOR_SHAPES, read_results
 from .structure_lines import Structure
 
 Array = NDArray[np.float64]
@@ -79,7 +79,7 @@ def _modes(file: Path, entry: ResultEntry, deck: Deck, checks: list[str]) -> tup
             raise DataError(f"has no mode {mode}; its modes: {known}", file=file)
         missing = [grid for grid in deck.grid if grid not in found.shapes[mode]]
         if missing:
-            raise DataError(f"mode {mode} has no displacement of GRID {missing[0]}; {NO_SHAPES[22:]}", file=file)
+            raise DataError(f"mode {mode} has no displacement of GRID {missing[0]}; {ASK_FOR_SHAPES}", file=file)
     vectors = np.array([[found.shapes[mode][grid] for grid in deck.grid] for mode in entry.modes])
     frequency = np.array([found.frequency.get(mode, 0.0) for mode in entry.modes])
     _refuse_rigid(file, entry.modes, frequency)

@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ....model.errors import DataError
-from ....model.wind.soundings.grids import MissingLibraryError
+from ....model.errors import DataError, MissingLibraryError
 
 
 def pynastran(module: str, name: str) -> Any:

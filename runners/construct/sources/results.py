@@ -14,7 +14,8 @@ from .pynastran import pynastran, reading
 
 Array = NDArray[np.float64]
 
-NO_SHAPES = "holds no mode shapes; run SOL 103 with DISPLACEMENT(PLOT,PRINT) = ALL, and PARAM,POST,-1 for an .op2"
+ASK_FOR_SHAPES = "run SOL 103 with DISPLACEMENT(PLOT,PRINT) = ALL, and PARAM,POST,-1 for an .op2"
+NO_SHAPES = f"holds no mode shapes; {ASK_FOR_SHAPES}"
 VECTOR = re.compile(r"R\s*E\s*A\s*L\s+E\s*I\s*G\s*E\s*N\s*V\s*E\s*C\s*T\s*O\s*R\s+N\s*O\s*\.\s+(\d+)")
 VALUES = re.compile(r"R\s*E\s*A\s*L\s+E\s*I\s*G\s*E\s*N\s*V\s*A\s*L\s*U\s*E\s*S")
 OTHER = re.compile(r"[A-Z](\s[A-Z]){5}")  # the spaced title of another table

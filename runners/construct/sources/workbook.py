@@ -14,9 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from ....model.construction.construction_file import read_masses, read_modes, read_stiffness
-from ....model.errors import DataError, DataErrorCollector, suggestion
+from ....model.errors import DataError, DataErrorCollector, MissingLibraryError, suggestion
 from ....model.files.numbers import parse_number
-from ....model.wind.soundings.grids import MissingLibraryError
 from .mapping import KILOGRAMS, METRES
 
 LBF = 4.4482216152605  # N

@@ -88,6 +88,11 @@ def test_a_month_of_both_planes_is_what_a_study_in_that_wind_says(cache):
     wanted = study.limit_passage(limits, WINDOW, draws=4000).probability
     spread = np.hypot(wanted.standard_error, float(found["standard_error"][0, 0]))
     assert float(found["probability"][0, 0]) == pytest.approx(wanted.value, abs=4 * spread + 0.06 * wanted.value)
+    levels = study.response_statistics(np.arange(60.0, 90.1, 0.5), responses=moments).percentile(0.00135)
+    for name in moments:
+        assert found["level"].sel(response=name).item() == pytest.approx(
+            float(levels.sel(response=name).max()), rel=5e-3
+        )
 
 
 @pytest.fixture(scope="module")
