@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import importlib
 from pathlib import Path
 
 import pandas as pd
@@ -64,8 +65,7 @@ def opens_in_xarray(file: Path, pint: bool) -> None:
     with xr.open_dataset(file) as dataset:
         assert dataset.data_vars
         if pint:
-            import pint_xarray  # noqa: F401 - the accessor
-
+            importlib.import_module("pint_xarray")  # which makes the accessor
             dataset.load().pint.quantify()
 
 
