@@ -53,6 +53,7 @@ __getattr__, __dir__, __all__ = _lazy.attach(
         ],
         "runners.flight_load.upcrossings": ["NotDifferentiableError"],
         "runners.gusts.shapes": ["GustError"],
+        "runners.measured_winds.profiles": ["UnlikelyWindWarning"],
         "runners.parameter_study.cluster": ["SchedulerError"],
         "runners.parameter_study.sampling": ["UnbalancedSampleWarning"],
         "runners.parameter_study.store": ["ResumeError"],

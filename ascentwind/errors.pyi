@@ -45,6 +45,7 @@ from .runners.flight_load.request import SpacingWarning as SpacingWarning
 from .runners.flight_load.request import UncheckedStationsWarning as UncheckedStationsWarning
 from .runners.flight_load.upcrossings import NotDifferentiableError as NotDifferentiableError
 from .runners.gusts.shapes import GustError as GustError
+from .runners.measured_winds.profiles import UnlikelyWindWarning as UnlikelyWindWarning
 from .runners.parameter_study.cluster import SchedulerError as SchedulerError
 from .runners.parameter_study.sampling import UnbalancedSampleWarning as UnbalancedSampleWarning
 from .runners.parameter_study.store import ResumeError as ResumeError

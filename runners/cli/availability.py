@@ -186,11 +186,17 @@ def months(
 
 def _by_month(soundings: Path, wanted: list[str], site: str, named: bool) -> dict[str, TwoComponentStatistics]:
     """Return statistics of the months that soundings have; those asked for by name must be there."""
-    from ...model.wind.soundings.read import read_soundings
+    from ...model.wind.range_reference import MONTHS
+    from ...model.wind.soundings.read import read_profiles, read_soundings
     from ...model.wind.soundings.sounding import SoundingError
 
+    there = {MONTHS[p.time.month - 1] for p in read_profiles(soundings)[0] if p.time is not None}
+    if not there:
+        raise SoundingError("its profiles have no dates, which say their month; add a column 'date'", file=soundings)
     found, why = {}, {}
     for month in wanted:
+        if month not in there and not named:
+            continue
         try:
             found[month] = read_soundings(soundings, months=[month]).statistics(f"{site} {month}", site)
         except SoundingError as error:

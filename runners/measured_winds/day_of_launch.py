@@ -47,6 +47,7 @@ from .limited_loads import LimitedLoads, Row, limited_loads, row_weights, symmet
 from .met_winds import MetWinds, met_winds
 from .other_winds import in_mean_winds
 from .persistence import ComponentPersistence, Persistence
+from .random_wind import FARTHEST
 from .wind_field import Lasting, WindField, default_persistence, wind_field
 
 STEPS, FINER = 240, 10  # of the window, and of each for the chance of passing a limit
@@ -55,8 +56,8 @@ MOST_VALUES = 3000  # loads and times whose joint covariance is made
 LEFT_OUT = 2e-3  # of the instants' chances, at either end
 FEWEST = 4  # coarse steps looked at
 ERROR = 1.0  # m/s in a component, of a balloon's wind
+CLOCK = 1.5  # h that dates of balloons and their hours before launch may differ: files are dated by the nearest hour
 NEAREST = 50.0  # m: levels nearer to the one below are passed over, whose errors are not independent
-FARTHEST = 6.0  # standard deviations of a measured wind from the mean of the vehicle's month
 THRESHOLD = 0.01
 BAND = 1.645  # conditional sigmas to either side, which hold 90 %
 
@@ -79,6 +80,8 @@ class Balloons:
         Before launch.
     names : tuple of str
         Of the balloons.
+    flown : tuple of (Sounding, float)
+        The balloons, and the hours of each before launch.
     """
 
     altitude: NDArray[np.float64]
@@ -86,6 +89,7 @@ class Balloons:
     component: NDArray[np.intp]
     hours: NDArray[np.float64]
     names: tuple[str, ...]
+    flown: tuple[tuple[Sounding, float], ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -409,7 +413,9 @@ class DayOfLaunch:
         parts = [
             np.concatenate([getattr(b, name) for b in both]) for name in ("altitude", "wind", "component", "hours")
         ]
-        return replace(self, balloons=Balloons(*parts, names=self.balloons.names + new.names))
+        flown = self.balloons.flown + new.flown
+        _refuse_unlike(flown)
+        return replace(self, balloons=Balloons(*parts, names=self.balloons.names + new.names, flown=flown))
 
     def about_its_mean(self) -> DayOfLaunch:
         """Return the same with the vehicle's own deviations acting on the mean flight of the day, not of the season.
@@ -616,7 +622,7 @@ def _flight(case: Case, loads: LimitedLoads, window: tuple[float, float]) -> Fli
 
 
 def _balloons(flight: Flight, given: Sequence[tuple[Balloon, float]], met: MetWinds, error: float) -> Balloons:
-    levels, parts, names = flight.field.levels, [], []
+    levels, parts, names, flown = flight.field.levels, [], [], []
     for balloon, before in given:
         if isinstance(before, bool) or not isinstance(before, int | float) or not 0 <= before < np.inf:
             raise ParameterValueError(f"a sounding {before!r} h before launch; give hours of 0 or more")
@@ -648,7 +654,31 @@ def _balloons(flight: Flight, given: Sequence[tuple[Balloon, float]], met: MetWi
                 )  # fmt: skip
             parts.append((h, wind, np.full(h.size, number), np.full(h.size, float(before))))
         names.append(f"{sounding.name}, {before:g} h before")
-    return Balloons(*(np.concatenate(column) for column in zip(*parts, strict=True)), names=tuple(names))
+        flown.append((sounding, float(before)))
+    _refuse_unlike(flown)
+    columns = (np.concatenate(column) for column in zip(*parts, strict=True))
+    return Balloons(*columns, names=tuple(names), flown=tuple(flown))
+
+
+def _refuse_unlike(flown: Sequence[tuple[Sounding, float]]) -> None:
+    """Raise for balloons of two stations, or whose dates are not as far apart as their hours before launch."""
+    for number, (sounding, before) in enumerate(flown):
+        for other, other_before in flown[:number]:
+            file, name = sounding.file or None, sounding.name
+            if sounding.station and other.station and sounding.station != other.station:
+                raise SoundingError(
+                    f"is of station '{sounding.station}', and {other.name} of '{other.station}'; take balloons of one "
+                    "station", file=file, sounding=name,
+                )  # fmt: skip
+            if sounding.time is None or other.time is None or not (sounding.hours_stated and other.hours_stated):
+                continue
+            later = (sounding.time - other.time).total_seconds() / 3600.0
+            if abs(later - (other_before - before)) > CLOCK:
+                raise SoundingError(
+                    f"is dated {later:+g} h from {other.name}, and {before:g} and {other_before:g} h before launch "
+                    f"make that {other_before - before:+g} h; correct the hours before launch, or take the right file",
+                    file=file, sounding=name,
+                )  # fmt: skip
 
 
 def _one(balloon: Balloon) -> Sounding:
@@ -661,8 +691,9 @@ def _one(balloon: Balloon) -> Sounding:
         seen = np.isfinite(balloon.u[0])
         time = None if np.isnat(balloon.time[0]) else balloon.time[0].item()
         return Sounding(
-            balloon.names[0], balloon.station, time, balloon.altitude[seen], balloon.u[0, seen], balloon.v[0, seen]
-        )
+            balloon.names[0], balloon.station, time, balloon.altitude[seen], balloon.u[0, seen], balloon.v[0, seen],
+            hours_stated=balloon.hours_stated,
+        )  # fmt: skip
     found, _ = read_profiles(balloon)
     if len(found) != 1:
         raise SoundingError(

@@ -16,7 +16,7 @@ from ...model.errors import ParameterValueError
 from ...model.wind.record import COMPONENTS
 from ..case.case import Case
 from ..case.provenance import provenance
-from .random_wind import random_wind
+from .random_wind import FARTHEST, random_wind
 
 BAND = 1.645  # holds 90 %
 
@@ -38,6 +38,14 @@ def predict_wind(case: Case, altitude: ArrayLike, wind: ArrayLike, ahead: ArrayL
     field = random_wind(case, np.concatenate([measured, wanted]))
     n, count, whole = field.output.shape[2], measured.size, field.levels.size
     mean = field.mean.reshape(components, whole).T
+    spread = np.hypot(field.std.reshape(components, whole).T[:count], error)
+    far = np.divide(np.abs(values - mean[:count]), spread, out=np.zeros(spread.shape), where=spread > 0)
+    if far.max() > FARTHEST:
+        k, c = np.unravel_index(int(np.argmax(far)), far.shape)
+        raise ParameterValueError(
+            f"a wind of {values[k, c]:.3g} m/s at {measured[k]:g} m is {far[k, c]:.1f} standard deviations from the "
+            f"mean of the vehicle's wind, {mean[k, c]:.3g} m/s: is it in knots, or of another season or place?"
+        )
     z, P = np.zeros(n), field.start
     gains, predicted, std = (
         np.zeros((count, components, n)),

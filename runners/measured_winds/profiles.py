@@ -2,24 +2,30 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...model.errors import DataError
-from ...model.wind.soundings.collection import Soundings
+from ...model.errors import AscentwindWarning, DataError
+from ...model.wind.soundings.collection import FEWEST, Soundings
 from ...model.wind.soundings.quality import Quality
 from ...model.wind.soundings.read import LARGEST_GAP, at_levels, read_soundings
-from ...model.wind.soundings.sounding import Sounding
+from ...model.wind.soundings.sounding import Sounding, SoundingError
 from ..case.case import Case
 from ..case.climb import Climb
 from .conditioning import Measured
 from .met_winds import MetWinds
-from .random_wind import random_wind
+from .random_wind import FARTHEST, RandomWind, random_wind
 
 FILL = 250.0  # m, between levels where nothing was measured
+SPREAD = 1.6  # times the filter's deviations, as the root mean square of many profiles: knots are 1.94
+
+
+class UnlikelyWindWarning(AscentwindWarning):
+    """Measured winds are farther off the vehicle's wind than winds of its season and place are."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,10 +85,27 @@ def complete_profiles(case: Case, soundings: Soundings, last: float, met: MetWin
     Raises
     ------
     NoVehicleError
+    SoundingError
+        A profile that holds no level of the flight.
+
+    Warns
+    -----
+    UnlikelyWindWarning
+        Winds far off those of the vehicle's filter.
     """
     measured = met.of(soundings)
     first = float(Climb.of(case).altitudes[0])
     own = soundings.altitude
+    within = (own >= first) & (own <= last)
+    empty = ~np.isfinite(soundings.u[:, within]).any(axis=1)
+    if empty.any():
+        number = int(np.argmax(empty))
+        held = own[np.isfinite(soundings.u[number])]
+        others = f" ({int(empty.sum())} of {empty.size} profiles hold none of it)" if empty.size > 1 else ""
+        raise SoundingError(
+            f"holds {held[0]:g} to {held[-1]:g} m, and the flight goes from {first:.0f} to {last:.0f} m{others}; give "
+            "one that is there, or leave it out", file=soundings.source, sounding=soundings.names[number],
+        )  # fmt: skip
     below = np.arange(own[0] - FILL, first - FILL, -FILL)[::-1] if own[0] > first else np.zeros(0)
     above = np.arange(own[-1] + FILL, last + FILL, FILL) if own[-1] < last else np.zeros(0)
     levels = np.concatenate([np.maximum(below, min(first, own[0] - 1.0)), own, above])
@@ -93,6 +116,7 @@ def complete_profiles(case: Case, soundings: Soundings, last: float, met: MetWin
     observed = np.isfinite(wind)
     patterns, pattern = np.unique(observed, axis=0, return_inverse=True)
     random = random_wind(case, levels)
+    _tell_unlikely(wind, random, soundings)
     R, residual = random.covariance, []
     for number, seen in enumerate(patterns):
         if seen.all():
@@ -110,3 +134,30 @@ def complete_profiles(case: Case, soundings: Soundings, last: float, met: MetWin
     return CompleteProfiles(
         levels, wind, observed, pattern.ravel(), tuple(residual), soundings.names, soundings.time, soundings.source
     )
+
+
+def _tell_unlikely(wind: NDArray[np.float64], random: RandomWind, soundings: Soundings) -> None:
+    """Warn of one wind that is too far from the filter's mean, and of all winds together (n, c k)."""
+    std = random.std
+    off = np.abs(np.divide(wind - random.mean, std, out=np.full(wind.shape, np.nan), where=std > 0))
+    if not np.isfinite(off).any():
+        return
+    profile, place = np.unravel_index(int(np.nanargmax(off)), off.shape)
+    together = float(np.sqrt(np.nanmean(off**2)))
+    ask = "are they in knots, or of another season or place?"
+    where = (
+        f"{soundings.source}, sounding {soundings.names[int(profile)]}, {random.levels[place % random.levels.size]:g} m"
+    )
+    if len(wind) >= FEWEST and together > SPREAD:
+        told = (
+            f"{soundings.source}: the winds are {together:.2f} standard deviations of the vehicle's wind off its mean "
+            f"(root mean square of {len(wind)} profiles; about 1 is expected): {ask}"
+        )
+    elif off[profile, place] > FARTHEST:
+        told = (
+            f"{where}: {wind[profile, place]:.3g} m/s is {off[profile, place]:.1f} standard deviations from the mean "
+            f"of the vehicle's wind, {random.mean[place]:.3g} m/s: {ask}"
+        )
+    else:
+        return
+    warnings.warn(UnlikelyWindWarning(told), stacklevel=5)

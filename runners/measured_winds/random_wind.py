@@ -19,6 +19,8 @@ from ...model.wind.two_components import TwoComponentWind
 from ..case.case import Case
 from ..solvers.discretisation import symmetric_root
 
+FARTHEST = 6.0  # standard deviations of a measured wind from the mean of the vehicle's month
+
 
 @dataclass(frozen=True, eq=False)
 class RandomWind:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import importlib
 import importlib.util
 from collections.abc import Iterator
 from pathlib import Path
@@ -113,6 +114,14 @@ def _opened(file: Path) -> xr.Dataset:
             "netCDF-3 or CSV", file=file,
         )  # fmt: skip
     try:
+        importlib.import_module(library)
+    except Exception as error:  # such as cfgrib without the library of ecCodes
+        raise MissingLibraryError(
+            f"is {meant}, which {library} reads, and that is there but does not start ({error!s:.120}); install it "
+            f"anew with 'pip install --force-reinstall {library}{' eccodes' if engine == 'cfgrib' else ''}', or "
+            "convert the file to netCDF-3 or CSV", file=file,
+        ) from None  # fmt: skip
+    try:
         if engine == "cfgrib":
             return xr.open_dataset(file, engine=engine, backend_kwargs={"indexpath": ""})  # no index beside the file
         return xr.open_dataset(file, engine=engine, decode_times=False)
@@ -167,6 +176,12 @@ def _times(coordinate: xr.DataArray, file: Path) -> list[datetime.datetime]:
         raise SoundingError(
             f"counts time in the calendar '{calendar}', whose days are not those of balloons; take a field in the "
             "standard calendar", file=file,
+        )  # fmt: skip
+    counts = np.issubdtype(coordinate.dtype, np.number)
+    if counts and " since " not in str(coordinate.attrs.get("units", "")):
+        raise SoundingError(
+            f"its times are numbers without 'units' such as 'hours since 1900-01-01' ({coordinate.name}); say what "
+            "they count from", file=file,
         )  # fmt: skip
     try:
         decoded = xr.decode_cf(xr.Dataset({"time_": ("n", np.atleast_1d(coordinate.values), coordinate.attrs)}))[

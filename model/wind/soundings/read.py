@@ -216,8 +216,9 @@ def at_levels(
     codes, bad = find_faults((u, v))
     if bad and outliers == "refuse":
         raise SoundingError(
-            f"values that are no wind: {_listed(bad, profiles, levels)}; correct them, remove their profiles, or leave "
-            "them out with outliers='drop'", file=profiles[bad[0].profile].file or None,
+            f"values that are no wind: {_listed(bad, profiles, levels)}; are these knots under another unit? "
+            "Correct them, remove their profiles, or leave them out with outliers='drop'",
+            file=profiles[bad[0].profile].file or None,
         )  # fmt: skip
     if codes and incomplete == "refuse":
         raise SoundingError(
@@ -350,18 +351,25 @@ def _refuse_mixed(profiles: Sequence[Sounding]) -> None:
             f"is of station '{other.station}', and others are of '{stations[0]}'; read the stations one by one",
             file=other.file, sounding=other.name,
         )  # fmt: skip
-    seen: dict[datetime.datetime, Sounding] = {}
+    seen: dict[datetime.datetime, list[Sounding]] = {}
     for profile in profiles:
-        if profile.time is None or not profile.hours_stated:
+        if profile.time is None:
             continue
-        if profile.time in seen:
-            before = seen[profile.time]
+        others = seen.setdefault(profile.time, [])
+        # of a day without hours there may be several, but not the same one again
+        before = next((other for other in others if profile.hours_stated or _same_winds(profile, other)), None)
+        if before is not None:
+            date = f"{profile.time:%Y-%m-%d %H:%M}" if profile.hours_stated else f"{profile.time:%Y-%m-%d}"
             raise SoundingError(
-                f"has the date of sounding {before.name} ({Path(before.file).name}): {profile.time:%Y-%m-%d %H:%M} "
-                "stands twice; keep one of the two", file=profile.file, sounding=profile.name,
-                row=int(profile.line[0]) or None,
+                f"has the date {'' if profile.hours_stated else 'and the winds '}of sounding {before.name} "
+                f"({Path(before.file).name}): {date} stands twice; keep one of the two", file=profile.file,
+                sounding=profile.name, row=int(profile.line[0]) or None,
             )  # fmt: skip
-        seen[profile.time] = profile
+        others.append(profile)
+
+
+def _same_winds(one: Sounding, other: Sounding) -> bool:
+    return all(np.array_equal(getattr(one, part), getattr(other, part)) for part in ("altitude", "u", "v"))
 
 
 def _listed(faults: Sequence[Fault], profiles: Sequence[Sounding], levels: NDArray[np.float64]) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -25,10 +26,12 @@ LIMITS = aw.Limits.over_time([0.0, 150.0], {"bending_moment": [2.3e7, 2.3e7]}, {
 ALONG = aw.Limits(None, np.array([0.0, 50.0]), {"bending_moment": np.ones((1, 2))}, {"bending_moment": "N m"})
 
 
-def balloon(case, seed: int = 5, top: float = 13000.0, spacing: float = 300.0, factor: float = 1.0) -> Sounding:
+def balloon(
+    case, seed: int = 5, top: float = 13000.0, spacing: float = 300.0, factor: float = 1.0, hour: int = 12
+) -> Sounding:
     levels = np.arange(300.0, top, spacing)
     wind = random_wind(case, levels).drawn(np.random.default_rng(seed), 1)[0]
-    return Sounding("balloon", "", datetime.datetime(2003, 3, 1, 12), levels, factor * wind, 0 * wind)
+    return Sounding("balloon", "", datetime.datetime(2003, 3, 1, hour), levels, factor * wind, 0 * wind)
 
 
 def asked(case, soundings, hours, **more):
@@ -37,7 +40,7 @@ def asked(case, soundings, hours, **more):
 
 def test_conditioning_equals_the_dense_gaussian_vector(as504):
     """Two balloons of different lags and errors: all blocks written out, and the textbook's formula."""
-    first, second = balloon(as504), balloon(as504, 6, 9000.0, 450.0)
+    first, second = balloon(as504), balloon(as504, 6, 9000.0, 450.0, hour=16)
     persistence = Persistence(40.0, 0.8, 8000.0, 0.7)
     found = asked(as504, [first, second], [6.0, 2.0], persistence=persistence, error=1.3)
     field, flight = found.flight.field, found.flight
@@ -72,7 +75,7 @@ def test_conditioning_equals_the_dense_gaussian_vector(as504):
 
 
 def test_one_balloon_after_the_other_is_both_at_once(as504):
-    first, second = balloon(as504), balloon(as504, 6)
+    first, second = balloon(as504), balloon(as504, 6, hour=16)
     both = asked(as504, [first, second], [6.0, 2.0])
     updated = asked(as504, first, 6.0).update(second, 2.0)
     np.testing.assert_allclose(updated.mean, both.mean, rtol=1e-12)
@@ -269,6 +272,21 @@ def test_the_recursive_predictor_is_the_batch(as504, error):
     assert found["gain"].sizes == {"altitude": k, "state": 3}
 
 
+def test_balloons_that_do_not_go_together(as504):
+    """Of two stations; dated otherwise than their hours before launch say, by less than the hour of a file or more."""
+    first = balloon(as504)  # of 12:00
+    launch = asked(as504, first, 6.0)
+    with pytest.raises(SoundingError, match="of station 'B', and balloon of 'A'; take balloons of one station"):
+        asked(as504, [replace(first, station="A"), replace(first, station="B", time=None)], [6.0, 2.0])
+    for minutes, fits in ((240, True), (200, True), (340, False), (0, False), (-240, False)):
+        later = replace(balloon(as504, 6), time=first.time + datetime.timedelta(minutes=minutes))
+        if fits:
+            assert launch.update(later, 2.0).balloons.names[1] == "balloon, 2 h before"
+            continue
+        with pytest.raises(SoundingError, match=r"and 2 and 6 h before launch make that \+4 h; correct the hours"):
+            launch.update(later, 2.0)
+
+
 @pytest.mark.parametrize(
     ("change", "says"),
     [
@@ -278,6 +296,7 @@ def test_the_recursive_predictor_is_the_batch(as504, error):
         ({"altitude": ["x"]}, "are no numbers"),
         ({"error": -1.0}, "an error of -1.0"),
         ({"ahead": [np.nan]}, "ahead is a list of finite numbers"),
+        ({"wind": [1.0, 90.0]}, "90 m/s at 900 m is .* standard deviations from the mean .* is it in knots"),
     ],
 )
 def test_what_cannot_be_predicted_is_refused(as504, change, says):

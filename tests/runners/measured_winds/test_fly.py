@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -18,6 +19,7 @@ from ascentwind.model.wind.statistics import WindModel
 from ascentwind.runners import Study
 from ascentwind.runners.case.climb import Climb
 from ascentwind.runners.measured_winds.level_weights import level_weights
+from ascentwind.runners.measured_winds.profiles import UnlikelyWindWarning
 from ascentwind.runners.measured_winds.random_wind import random_wind
 from ascentwind.runners.solvers.mean_response import mean_response
 from ascentwind.runners.wind.verification import verify
@@ -54,6 +56,7 @@ def test_a_deterministic_profile_equals_its_integration(as504):
     assert (np.abs(flown.values[0] - wanted).max(axis=0) < 1e-6 * np.abs(wanted).max(axis=0)).all()
 
 
+@pytest.mark.filterwarnings("ignore::ascentwind.errors.UnlikelyWindWarning")
 def test_a_file_of_one_profile_is_flown(as504, tmp_path):
     levels, wind = jagged(1)
     rows = [f"{h!r},{u!r},0" for h, u in zip(levels.tolist(), wind.tolist(), strict=True)]
@@ -141,6 +144,7 @@ def test_partly_observed_profiles_are_completed_by_the_dense_gaussian_vector(as5
     assert np.abs(flown.completed.var(axis=0) / flown.predicted_std**2 - 1).max() < 4 * np.sqrt(2 / 599)
 
 
+@pytest.mark.filterwarnings("ignore::ascentwind.errors.UnlikelyWindWarning")
 def test_worst_profiles_are_named_with_their_dates(as504, tmp_path):
     levels, wind = jagged(2)
     both = np.stack([wind, 3 * wind, -wind])
@@ -155,6 +159,7 @@ def test_worst_profiles_are_named_with_their_dates(as504, tmp_path):
     assert dataset["value"].sizes == {"profile": 3, "time": 5, "response": 1}
 
 
+@pytest.mark.filterwarnings("ignore::ascentwind.errors.UnlikelyWindWarning")
 def test_the_component_across_the_flight(as504):
     levels, wind = jagged(3)
     read = soundings(levels, wind[None])
@@ -182,6 +187,26 @@ def test_what_cannot_be_flown_is_refused(as504, change, error, says):
     asked = {"profiles": soundings(levels, wind[None]), "times": TIMES} | change
     with pytest.raises(error, match=says):
         as504.fly(asked.pop("profiles"), asked.pop("times"), **asked)
+
+
+def test_winds_far_off_the_vehicles_are_told(as504):
+    """Drawn winds are not, their values in knots are; one wind of many sigmas is, with its level."""
+    levels = np.arange(0.0, 16000.0, 500.0)
+    drawn = random_wind(as504, levels).drawn(np.random.default_rng(4), 40)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        as504.fly(soundings(levels, drawn), TIMES)
+    with pytest.warns(UnlikelyWindWarning, match=r"root mean square of 40 profiles.*are they in knots"):
+        as504.fly(soundings(levels, drawn * 3600 / 1852), TIMES)
+    drawn[3, 8] = -80.0
+    with pytest.warns(UnlikelyWindWarning, match=r"drawn, sounding 3, 4000 m: -80 m/s is .* standard deviations"):
+        as504.fly(soundings(levels, drawn), TIMES)
+
+
+def test_a_sounding_beside_the_flight_is_refused(as504):
+    levels, wind = np.array([60000.0, 61000.0]), np.zeros((1, 2))
+    with pytest.raises(SoundingError, match="sounding 0: holds 60000 to 61000 m, and the flight goes from"):
+        as504.fly(soundings(levels, wind), TIMES)
 
 
 def test_a_system_of_ones_own_has_no_measured_wind():
