@@ -86,19 +86,35 @@ class Fit:
 
 @dataclass(frozen=True, eq=False)
 class Residuals:
-    """Residuals and their Jacobian as functions of (unknowns, data)."""
+    """Residuals and their Jacobian as functions of (unknowns, data).
 
-    value: ca.Function
-    jacobian: ca.Function
+    Attributes
+    ----------
+    count, unknowns : int
+        Number of residuals m, and of unknowns n.
+    value : callable
+        Returns (m,).
+    jacobian : callable
+        Returns (m, n).
+    """
+
+    count: int
+    unknowns: int
+    value: Callable[[NDArray, NDArray], NDArray]
+    jacobian: Callable[[NDArray, NDArray], NDArray]
 
 
 def residual_functions(residuals: ca.SX, unknowns: ca.SX, data: ca.SX | None = None) -> Residuals:
     """Return the functions of an expression; ``data`` are numbers that change from one fit to the next."""
     residuals = ca.densify(residuals)
     arguments = [unknowns, ca.SX(0, 1) if data is None else data]
+    value = ca.Function("residuals", arguments, [residuals])
+    jacobian = ca.Function("jacobian", arguments, [ca.jacobian(residuals, unknowns)])
     return Residuals(
-        ca.Function("residuals", arguments, [residuals]),
-        ca.Function("jacobian", arguments, [ca.jacobian(residuals, unknowns)]),
+        residuals.numel(),
+        unknowns.numel(),
+        lambda x, given: np.array(value(x, given)).ravel(),
+        lambda x, given: np.array(jacobian(x, given)),
     )
 
 
@@ -119,11 +135,8 @@ def fit_least_squares(
     FitError
         Fewer residuals than unknowns, or residuals at the start that are not finite.
     """
-    if functions.value.numel_out(0) < functions.value.numel_in(0):
-        raise FitError(
-            f"{functions.value.numel_in(0)} unknowns cannot follow from {functions.value.numel_out(0)} values; "
-            "give more levels"
-        )
+    if functions.count < functions.unknowns:
+        raise FitError(f"{functions.unknowns} unknowns cannot follow from {functions.count} values; give more levels")
     given = np.zeros(0) if data is None else data
     begin = time.monotonic()
     best: tuple[float, NDArray] = (np.inf, start)
@@ -131,7 +144,7 @@ def fit_least_squares(
 
     def evaluate(x: NDArray) -> NDArray:
         nonlocal best, evaluations
-        r = np.array(functions.value(x, given)).ravel()
+        r = functions.value(x, given)
         evaluations += 1
         usable = np.isfinite(r).all() and np.abs(r).max() < LARGEST
         cost = 0.5 * float(r @ r) if usable else np.inf
@@ -152,7 +165,7 @@ def fit_least_squares(
         found = least_squares(
             evaluate,
             start,
-            jac=lambda x: np.array(functions.jacobian(x, given)),  # pyright: ignore[reportArgumentType]
+            jac=lambda x: functions.jacobian(x, given),  # pyright: ignore[reportArgumentType]
             method="lm",
             x_scale="jac",
             ftol=options.tolerance,

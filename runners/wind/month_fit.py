@@ -14,10 +14,11 @@ from .synthesis.synthesise import synthesise
 from .two_component_fit import fit_noise_correlation
 
 EVERY = 4  # of the fitted samples are kept, 250 m apart: a quarter of the size
+OPTIONS = FitOptions(time_limit=1800.0)  # some 40 times what a fit takes: where it ends is no matter of the machine
 
 
 def fit_month(
-    both: TwoComponentStatistics, period: str, site: str, edition: str, options: FitOptions | None = None
+    both: TwoComponentStatistics, period: str, site: str, edition: str, options: FitOptions = OPTIONS
 ) -> MonthWind:
     """Return the wind of a month: third order and two noises for each component, joined by their first noises.
 

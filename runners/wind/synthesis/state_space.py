@@ -16,7 +16,6 @@ the last with gains of their own.
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import lru_cache
 from itertools import pairwise
 
 import casadi as ca
@@ -26,10 +25,9 @@ from numpy.typing import NDArray
 from ....model.wind.propagation import divided
 from ....model.wind.shaping_filter import ShapingFilter
 from ....model.wind.statistics import WindStatistics
-from ...solvers.least_squares import FitOptions, Residuals, fit_least_squares, residual_functions
+from ...solvers.least_squares import FitOptions, Residuals, fit_least_squares
 from ..fitting.altitude_grid import (
     covariance_data,
-    covariance_symbols,
     dense_samples,
     knots_for,
     natural_spline,
@@ -103,7 +101,7 @@ def synthesise_state_space(
     form = _Form(order, noises)
     knots = knots_for(statistics.altitude) / 1000.0
     options = options or FitOptions()
-    functions = _residuals(tuple(statistics.altitude.tolist()), order, noises)
+    functions = _residuals(statistics.altitude, form)
     data, random = covariance_data(statistics), np.random.default_rng(options.seed)
     # half the sum of squares at which the root mean square error is a small share of the mean variance
     enough = 0.5 * statistics.altitude.size**2 / 2 * (ENOUGH * np.mean(statistics.standard_deviation**2)) ** 2
@@ -129,35 +127,108 @@ def synthesise_state_space(
     )
 
 
-@lru_cache(maxsize=8)
-def _residuals(altitude: tuple[float, ...], order: int, noises: int) -> Residuals:
+def _residuals(altitude: NDArray[np.float64], form: _Form) -> Residuals:
     """Return the errors of the distinct covariances, m2/s2, and what chooses among equal fits."""
-    form, levels = _Form(order, noises), np.array(altitude)
-    h, knots = levels / 1000.0, knots_for(levels) / 1000.0
-    x = ca.SX.sym("x", knots.size * form.functions)
-    table = ca.reshape(x, knots.size, form.functions)
-    data, deviation, covariance = covariance_symbols(h.size)
-    basis = natural_spline(knots, np.eye(knots.size))
+    h, knots = altitude / 1000.0, knots_for(altitude) / 1000.0
+    correlations = _Correlations(h, knots, form)
+    upper, lower = correlations.pairs
+    smooth = np.kron(np.eye(form.functions), SMOOTHNESS * second_differences(knots.size))
+    start = np.repeat(form.start(), knots.size)
+    always = np.vstack([smooth, RIDGE * np.eye(start.size)])
+    target = np.concatenate([np.zeros(len(smooth)), RIDGE * start])
 
-    def matrices(x: float):
-        return form.matrices(ca.vec(ca.DM(basis(x)).T @ table), ca.SX.zeros, ca.exp)
+    def products(data: NDArray) -> tuple[NDArray, NDArray]:
+        deviation, covariance = data[: h.size], data[h.size :].reshape(h.size, h.size)
+        return deviation[upper] * deviation[lower], covariance[upper, lower]
 
-    columns, errors = matrices(h[0])[2], []
-    for i, edges in enumerate(divided(h, FIT_STEP), start=1):
-        phi = ca.SX.eye(order)
-        for a, b in pairwise(edges):
-            F, _, _ = matrices(0.5 * (a + b))
-            term = phi
-            for q in range(1, TAYLOR + 1):
-                term = (b - a) / q * (F @ term)
-                phi += term
-        columns = phi @ columns
-        H = matrices(h[i])[2]
-        errors += [ca.dot(H, columns[:, j]) * deviation[i] * deviation[j] - covariance[i, j] for j in range(i)]
-        columns = ca.horzcat(columns, H)
-    smooth = ca.vec(ca.DM(second_differences(knots.size)) @ table)
-    pull = x - np.repeat(form.start(), knots.size)
-    return residual_functions(ca.vertcat(*errors, SMOOTHNESS * smooth, RIDGE * pull), x, data)
+    def value(x: NDArray, data: NDArray) -> NDArray:
+        scale, wanted = products(data)
+        return np.concatenate([scale * correlations.value(x) - wanted, always @ x - target])
+
+    def jacobian(x: NDArray, data: NDArray) -> NDArray:
+        return np.vstack([products(data)[0][:, None] * correlations.jacobian(x), always])
+
+    return Residuals(upper.size + len(always), start.size, value, jacobian)
+
+
+class _Correlations:
+    """Correlations of the wind at all pairs of levels, H_i Phi(i, j) H_j', and their derivatives.
+
+    A step of the propagation takes the functions' values v at its middle alone, so that with s between the levels
+
+        d (H_i Phi(i, j) H_j') / d v_s = [H_i Phi(i, end of s)] [d Phi_s / d v_s] [Phi(start of s, j) H_j'],
+
+    and only one step is differentiated symbolically.
+    """
+
+    def __init__(self, h: NDArray[np.float64], knots: NDArray[np.float64], form: _Form):
+        edges = divided(h, FIT_STEP)
+        self.steps_of = [e.size - 1 for e in edges]
+        middles = np.concatenate([0.5 * (e[1:] + e[:-1]) for e in edges])
+        self.lengths = np.concatenate([np.diff(e) for e in edges])
+        basis = natural_spline(knots, np.eye(knots.size))
+        self.at_middles, self.at_levels = basis(middles), basis(h)
+        self.shape = form.functions, knots.size
+        self.order, self.pairs = form.order, np.tril_indices(h.size, -1)
+        v, d = ca.SX.sym("v", form.functions), ca.SX.sym("d")
+        F, _, H = form.matrices(v, ca.SX.zeros, ca.exp)
+        phi = term = ca.SX.eye(form.order)
+        for q in range(1, TAYLOR + 1):
+            term = d / q * (F @ term)
+            phi += term
+        flat = ca.vec(phi.T)
+        self.step = ca.Function("step", [v, d], [flat, ca.vec(ca.jacobian(flat, v).T)]).map(middles.size)
+        self.direction = ca.Function("direction", [v], [H, ca.vec(ca.jacobian(H, v).T)]).map(h.size)
+
+    def _parts(self, x: NDArray) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+        """Return Phi (s, n, n) and d Phi (s, n, n, f) of all steps, H (k, n) and d H (k, n, f) at all levels."""
+        n, table = self.order, x.reshape(self.shape)
+        phi, slopes = (np.array(a).T for a in self.step(table @ self.at_middles.T, self.lengths[None]))
+        H, turns = (np.array(a).T for a in self.direction(table @ self.at_levels.T))
+        return phi.reshape(-1, n, n), slopes.reshape(-1, n, n, self.shape[0]), H, turns.reshape(-1, n, self.shape[0])
+
+    def value(self, x: NDArray) -> NDArray[np.float64]:
+        """Return the correlations of the pairs, (p,)."""
+        phi, _, H, _ = self._parts(x)
+        found, columns, s = [], H[:1].T, 0
+        for i, count in enumerate(self.steps_of, start=1):
+            for k in range(s, s + count):
+                columns = phi[k] @ columns
+            s += count
+            found.append(H[i] @ columns)
+            columns = np.column_stack([columns, H[i]])
+        return np.concatenate(found)
+
+    def jacobian(self, x: NDArray) -> NDArray[np.float64]:
+        """Return their derivatives, (p, n)."""
+        phi, slopes, H, turns = self._parts(x)
+        k, n = H.shape[0], self.order
+        # columns[s, :, j] = Phi(start of s, j) H_j', rows[s, i] = H_i Phi(i, end of s), zero where s is not between
+        columns, rows = np.zeros((len(phi), n, k)), np.zeros((len(phi), k, n))
+        here, forward = np.zeros((n, k)), np.zeros((k, n, k))
+        ends = np.cumsum(self.steps_of)
+        for i, (first, end) in enumerate(zip(ends - self.steps_of, ends, strict=True)):
+            here[:, i] = H[i]
+            for s in range(first, end):
+                columns[s], here = here, phi[s] @ here
+            forward[i + 1] = here
+        there, backward = np.zeros((k, n)), np.zeros((k, k, n))
+        for i, (first, end) in reversed(list(enumerate(zip(ends - self.steps_of, ends, strict=True)))):
+            there[i + 1] = H[i + 1]
+            for s in range(end - 1, first - 1, -1):
+                rows[s], there = there, there @ phi[s]
+            backward[i] = there
+        inside = rows[:, None] @ slopes.transpose(0, 3, 1, 2) @ columns[:, None]
+        upper, lower = self.pairs
+        by_step = np.tensordot(inside[:, :, upper, lower], self.at_middles, (0, 0))
+        # H_i from the left, H_j from the right
+        left = np.einsum("pn,pnf->pf", forward[upper, :, lower], turns[upper])
+        right = np.einsum("pn,pnf->pf", backward[lower, upper], turns[lower])
+        at = self.at_levels
+        whole = (
+            by_step.transpose(1, 0, 2) + left[:, :, None] * at[upper][:, None] + right[:, :, None] * at[lower][:, None]
+        )
+        return whole.reshape(upper.size, -1)
 
 
 def _own_covariance(statistics: WindStatistics, form: _Form, knots: NDArray, values: NDArray) -> NDArray[np.float64]:

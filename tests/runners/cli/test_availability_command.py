@@ -74,13 +74,13 @@ def test_months_of_soundings(tmp_path, monkeypatch, capsys):
 
 
 @pytest.mark.slow
-@pytest.mark.filterwarnings("ignore::ascentwind.errors.StalledFitWarning")
+@pytest.mark.filterwarnings("error::ascentwind.errors.StalledFitWarning")
 def test_a_month_made_again_is_the_shipped_one(tmp_path, monkeypatch):
-    """January by the command: of each component within 0.1 m2/s2 rms, of their sum 1.5, if a fit stops at its limit."""
-    assert run(monkeypatch, "wind", "months", "--months", "january", "--out", tmp_path) == 0
-    (made,), (shipped,) = read_months(tmp_path), read_months(None, ["january"])
+    """July by the command: what the tolerance of a fit, 1e-4 of its cost, leaves open on another machine."""
+    assert run(monkeypatch, "wind", "months", "--months", "july", "--out", tmp_path) == 0
+    (made,), (shipped,) = read_months(tmp_path), read_months(None, ["july"])
     h = shipped.altitude
-    for weights, most in (((1.0, 0.0), 0.1), ((0.0, 1.0), 0.1), ((1.0, 1.0), 1.5)):
+    for weights, most in (((1.0, 0.0), 0.01), ((0.0, 1.0), 0.01), ((1.0, 1.0), 0.05)):
         here, there = (filter_wind(m.filter_along(weights), h, 0 * h).covariance for m in (made, shipped))
         assert np.sqrt(np.mean((here - there) ** 2)) < most
     np.testing.assert_allclose(made.mean, shipped.mean, rtol=1e-7)

@@ -34,7 +34,7 @@ def test_twelve_months_ship_and_are_those_of_their_tables():
             ((0.0, 1.0), both.meridional, month.mean[1]),
         ):
             R = filter_wind(month.filter_along(weights), h, 0 * h).covariance
-            assert np.sqrt(np.mean((R - part.covariance) ** 2)) < 0.35, month.period  # m2/s2, of some hundred
+            assert np.sqrt(np.mean((R - part.covariance) ** 2)) < 0.2, month.period  # m2/s2, of some hundred
             np.testing.assert_allclose(np.sqrt(np.diagonal(R)), part.standard_deviation, rtol=1e-4)
             np.testing.assert_allclose(mean, part.mean, atol=1e-6)
         together = np.diagonal(filter_wind(month.filter_along((1.0, 1.0)), h, 0 * h).covariance)

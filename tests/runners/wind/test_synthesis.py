@@ -13,12 +13,18 @@ from ascentwind.model.wind.record import COMPONENTS
 from ascentwind.model.wind.shaping_filter import ShapingFilter
 from ascentwind.model.wind.statistics import WindStatistics, closed_form_filter
 from ascentwind.runners.solvers.least_squares import FitError, FitOptions, StalledFitWarning
-from ascentwind.runners.wind.fitting.altitude_grid import propagated_covariance, transition
+from ascentwind.runners.wind.fitting.altitude_grid import (
+    covariance_data,
+    knots_for,
+    natural_spline,
+    propagated_covariance,
+    transition,
+)
 from ascentwind.runners.wind.fitting.frozen_poles import largest_pole
 from ascentwind.runners.wind.fitting.intervals import covariance_interval, share_inside
 from ascentwind.runners.wind.synthesis.impulse_response import average_responses
 from ascentwind.runners.wind.synthesis.result import SynthesisError
-from ascentwind.runners.wind.synthesis.state_space import _Form
+from ascentwind.runners.wind.synthesis.state_space import _Form, _residuals
 from ascentwind.runners.wind.synthesis.synthesise import METHODS, SlowFilterWarning, synthesise
 from ascentwind.runners.wind.verification import (
     engine_covariance,
@@ -265,6 +271,32 @@ def test_any_coefficients_of_the_state_space_form_are_strictly_stable(order, noi
         # unit covariance of the states and of the wind at every altitude
         assert pytest.approx(-G @ G.T, abs=1e-12) == F + F.T
         assert np.linalg.norm(H) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(("order", "noises"), [(1, 1), (3, 2)])
+def test_derivatives_of_the_state_space_residuals(order, noises):
+    """By differences; and the correlation of two levels by Magnus steps of the functions themselves."""
+    part, form, random = shipped_statistics().between(0.0, 5000.0), _Form(order, noises), np.random.default_rng(1)
+    h, data = part.altitude / 1000.0, covariance_data(part)
+    functions, knots = _residuals(part.altitude, form), knots_for(part.altitude) / 1000.0
+    x = np.repeat(form.start(), knots.size) + 0.3 * random.standard_normal(form.functions * knots.size)
+    found, step = functions.jacobian(x, data), 1e-5
+    assert found.shape == (functions.count, functions.unknowns)
+    for k in range(x.size):
+        e = np.zeros(x.size)
+        e[k] = step
+        difference = (functions.value(x + e, data) - functions.value(x - e, data)) / (2 * step)
+        np.testing.assert_allclose(found[:, k], difference, atol=1e-7 * np.abs(found).max())
+    spline = natural_spline(knots, x.reshape(form.functions, -1).T)
+
+    def at(y: float):
+        return form.matrices(spline(y), lambda *s: np.zeros(s), np.exp)
+
+    column = at(h[0])[2]
+    for a, b in itertools.pairwise(np.linspace(h[0], h[1], 101)):
+        column = transition(lambda y: at(y)[:2], a, b)[0] @ column
+    correlation = (functions.value(x, data)[0] + part.covariance[1, 0]) / part.standard_deviation[:2].prod()
+    assert correlation == pytest.approx((at(h[1])[2].T @ column).item(), abs=3e-3)  # steps of 250 m
 
 
 def test_frozen_poles_between_the_samples():
