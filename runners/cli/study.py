@@ -10,10 +10,12 @@ import typer
 from ..present.terminal import console, errors
 from .exit_codes import INTERRUPTED
 from .job import Job, load_study, steps
+from .terminal import Changes
 
 
 def study(
     file: Annotated[Path, typer.Argument(help="TOML file of the study (docs/studies.md).")],
+    changes: Changes = None,
     out: Annotated[
         Path | None,
         typer.Option(help="Folder for results, FILE-results without it. One that holds a part is continued."),
@@ -29,7 +31,7 @@ def study(
 
     plan = read_plan(file)
     folder = out or Path(f"{file.stem}-results")
-    loaded = load_study(plan.named_vehicle())
+    loaded = load_study(plan.named_vehicle(), changes)
     started = False
     try:
         with steps("members") as bar:

@@ -21,7 +21,7 @@ from ...model.errors import AscentwindError
 from ...model.vehicle.vehicle import Vehicle
 from ..case.provenance import data_hash
 from ..study import Study
-from .compute import Chunk, ChunkResult, Task, code_of, compute_chunk, empty_result
+from .compute import NUMBERS, Chunk, ChunkResult, Task, code_of, compute_chunk, empty_result
 
 log = logging.getLogger(__name__)
 
@@ -235,9 +235,9 @@ def together(spent: float, computed: int, waiting: int, threads: int) -> int:
 
 
 def _joined(parts: list[ChunkResult]) -> ChunkResult:
-    mean, variance, status = (np.concatenate([getattr(p, n) for p in parts]) for n in ("mean", "variance", "status"))
+    joined = {name: np.concatenate([getattr(p, name) for p in parts]) for name in (*NUMBERS, "status")}
     reason = tuple(r for p in parts for r in p.reason)
-    return ChunkResult(mean, variance, status, reason, sum(p.cpu_seconds for p in parts))
+    return ChunkResult(**joined, reason=reason, cpu_seconds=sum(p.cpu_seconds for p in parts))
 
 
 def _identity(study: Study) -> dict[str, str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from threading import Lock
 
 import numpy as np
@@ -13,10 +13,12 @@ from numpy.typing import NDArray
 from ...codegen.sweep.compiled import sweep_of
 from ...codegen.system.executable import ExecutableSystem
 from ...model.errors import AscentwindError
-from ..solvers.adjoint import adjoint_member
+from ..solvers.adjoint import AdjointSolver
 from ..solvers.stability import first_unstable
 from ..solvers.sweep import sweep_member
 from ..statistics.cvodes import Cvodes
+from ..statistics.norm import NormOfNormal
+from ..statistics.resultants import resultant_pairs
 from ..statistics.sweep import Sweep
 from ..study import Study
 from .quantities import Quantity, member_numbers
@@ -24,6 +26,7 @@ from .quantities import Quantity, member_numbers
 CHUNK = 10  # members computed and stored together
 COMPUTED, UNSTABLE, FAILED = 0, 1, 2
 STATUS = ("computed", "unstable", "failed")
+NUMBERS = ("mean", "variance", "plane_mean", "plane_covariance", "level")
 _interpreted = Lock()  # CVODES catches what CasADi writes, for the whole process
 
 
@@ -37,13 +40,24 @@ class Task:
     times : tuple of float
         End times t2, increasing, s.
     responses : tuple of str
-    relative_tolerance : float
+    resultants : tuple of str
+        Norms of two responses each.
+    relative_tolerance, probability : float
+        The second is that with which a resultant passes its level at an instant.
     """
 
     quantities: tuple[Quantity, ...]
     times: tuple[float, ...]
     responses: tuple[str, ...]
+    resultants: tuple[str, ...]
     relative_tolerance: float
+    probability: float
+
+    def rows(self, study: Study) -> tuple[list[int], list[tuple[int, int]]]:
+        """Return the numbers of the responses among all, and of both responses of each resultant."""
+        pairs, number = resultant_pairs(study.system.output_names), study.system.output_index
+        of_resultants = [(number(first), number(second)) for first, second in map(pairs.__getitem__, self.resultants)]
+        return [number(name) for name in self.responses], of_resultants
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +84,11 @@ class ChunkResult:
     ----------
     mean : (k, times, responses) array
     variance : (k, times, responses, sources) array
-        NaN where a member failed.
+    plane_mean : (k, times, resultants, 2) array
+        Of both responses of a resultant.
+    plane_covariance : (k, times, resultants, sources, 2, 2) array
+    level : (k, times, resultants) array
+        What a resultant passes with the task's probability. All are NaN where a member failed.
     status : (k,) int8 array
         COMPUTED, UNSTABLE (computed, with an unstable root at a frozen time) or FAILED.
     reason : tuple of str
@@ -81,9 +99,17 @@ class ChunkResult:
 
     mean: NDArray[np.float64]
     variance: NDArray[np.float64]
+    plane_mean: NDArray[np.float64]
+    plane_covariance: NDArray[np.float64]
+    level: NDArray[np.float64]
     status: NDArray[np.int8]
     reason: tuple[str, ...]
     cpu_seconds: float = 0.0
+
+    @property
+    def numbers(self) -> dict[str, NDArray[np.float64]]:
+        """All that is computed, by name."""
+        return {name: getattr(self, name) for name in NUMBERS}
 
 
 def chunks(values: NDArray[np.float64]) -> Iterator[Chunk]:
@@ -97,18 +123,18 @@ def compute_chunk(study: Study, task: Task, chunk: Chunk) -> ChunkResult:
     start = time.thread_time()
     result = empty_result(study, task, len(chunk.values))
     reasons, statistics = list(result.reason), _member_statistics(study, task)
-    rows = [study.system.output_index(name) for name in task.responses]
     for k, row in enumerate(chunk.values):
         try:
             member = member_numbers(study, task.quantities, row)
-            mean, variance = statistics(member)
+            found = statistics(member)
             reasons[k] = first_unstable(member, task.times[-1]) or ""
         except AscentwindError as error:
             reasons[k] = str(error)
             continue
-        result.mean[k], result.variance[k] = mean[:, rows], variance[:, rows]
+        for name, values in found.items():
+            result.numbers[name][k] = values
         result.status[k] = UNSTABLE if reasons[k] else COMPUTED
-    return ChunkResult(result.mean, result.variance, result.status, tuple(reasons), time.thread_time() - start)
+    return replace(result, reason=tuple(reasons), cpu_seconds=time.thread_time() - start)
 
 
 def engine_name(study: Study) -> str:
@@ -123,18 +149,25 @@ def code_of(study: Study) -> str:
     return sweep_of(study.executable).shared_library.key
 
 
-Numbers = tuple[NDArray[np.float64], NDArray[np.float64]]  # mean and variance
+Array = NDArray[np.float64]
+Numbers = dict[str, Array]  # one member's part of each of ``NUMBERS``
 
 
 def _member_statistics(study: Study, task: Task) -> Callable[[ExecutableSystem], Numbers]:
-    """Return what computes mean and variance of all responses of a member."""
+    """Return what computes the numbers of a member."""
+    rows, pairs = task.rows(study)
+    directly = [study.system.output_names[row] for row in {*rows, *(row for pair in pairs for row in pair)}]
     if engine_name(study) == Cvodes.name:
         settings = Cvodes(relative_tolerance=task.relative_tolerance)
 
         def by_cvodes(member: ExecutableSystem) -> Numbers:
-            member.system.refuse_direct_noise(task.responses)
+            member.system.refuse_direct_noise(directly)
             with _interpreted:
-                return adjoint_member(study.mean.fill(member), task.times, settings)
+                solver = AdjointSolver(study.mean.fill(member), settings)
+                runs = [solver.run(time) for time in task.times]
+                moments = [solver.pair_moments(time, pairs) for time in task.times] if pairs else []
+            mean, variance = (np.array([getattr(run, name)[rows] for run in runs]) for name in ("mean", "variance"))
+            return _numbers(task, mean, variance, moments, axis=0)
 
         return by_cvodes
     compiled = sweep_of(study.executable)
@@ -145,20 +178,34 @@ def _member_statistics(study: Study, task: Task) -> Callable[[ExecutableSystem],
             member,
             task.times,
             relative_tolerance=task.relative_tolerance,
-            responses=task.responses,
+            responses=directly,
             fill=study.mean.fill,
         )
-        return found.mean, found.variance
+        moments = [(found.mean[:, p], found.covariance[:, :, p][..., p]) for p in map(list, pairs)]
+        return _numbers(task, found.mean[:, rows], found.variance[:, rows], moments, axis=1)
 
     return by_sweep
 
 
+def _numbers(task: Task, mean: Array, variance: Array, moments: list[tuple[Array, Array]], axis: int) -> Numbers:
+    """Return the numbers of a member by name; mean and covariance of resultants are parts to stack along an axis."""
+    if not task.resultants:
+        return {"mean": mean, "variance": variance}
+    of_planes, between = (np.stack(parts, axis) for parts in zip(*moments, strict=True))
+    level = NormOfNormal(of_planes, between.sum(axis=2)).percentile(task.probability)
+    return {"mean": mean, "variance": variance, "plane_mean": of_planes, "plane_covariance": between, "level": level}
+
+
 def empty_result(study: Study, task: Task, members: int, reason: str = "") -> ChunkResult:
     """Return a result of which every member failed."""
-    shape = (members, len(task.times), len(task.responses))
-    return ChunkResult(
-        np.full(shape, np.nan),
-        np.full((*shape, len(study.system.sources)), np.nan),
-        np.full(members, FAILED, np.int8),
-        (reason,) * members,
-    )
+    over, sources = (members, len(task.times)), len(study.system.sources)
+    responses, resultants = len(task.responses), len(task.resultants)
+    shapes = {
+        "mean": (responses,),
+        "variance": (responses, sources),
+        "plane_mean": (resultants, 2),
+        "plane_covariance": (resultants, sources, 2, 2),
+        "level": (resultants,),
+    }
+    nothing = {name: np.full((*over, *shape), np.nan) for name, shape in shapes.items()}
+    return ChunkResult(**nothing, status=np.full(members, FAILED, np.int8), reason=(reason,) * members)

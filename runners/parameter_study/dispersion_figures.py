@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from textwrap import wrap
+
 import numpy as np
 import xarray as xr
 from matplotlib import rc_context
@@ -9,17 +11,18 @@ from matplotlib.figure import Figure
 from scipy import stats
 
 from ...model.system.names import COMBINED
-from ..present.style import COLORS, STYLE, words, wrapped
-from ..statistics.larger_side import LABEL, LARGER_SIDE, larger_side
+from ..present.style import COLORS, STYLE, wrapped
 from .compute import COMPUTED, STATUS
-from .measures import PEAK, displayed
+from .measures import PEAK, displayed, loads, timed
+from .measures import label as label_of
 from .run import ParameterStudy
 
 BINS = 40
+HALF_WIDTH = 44  # characters of a label below one of two panels
 
 
 def histogram_figure(result: ParameterStudy, measured: xr.Dataset, found: xr.Dataset, response: str) -> Figure:
-    """Return the distribution of the peak |mean| + 3 sigma beside the first-order normal one.
+    """Return the distribution of the peaks beside the first-order normal one.
 
     The axes are those of the stable members; unstable ones beyond them are counted.
     """
@@ -51,7 +54,7 @@ def histogram_figure(result: ParameterStudy, measured: xr.Dataset, found: xr.Dat
             cumulative.plot(x, 100 * below, "--", color=COLORS[COMBINED], lw=2, label="first order")
         for axes in (density, cumulative):
             axes.axvline(factor * at["nominal"].item(), color="black", lw=1, ls=":", label="nominal")
-            axes.set_xlabel(f"peak of {LABEL} {words(response)} ({unit})")
+            axes.set_xlabel("\n".join(wrap(f"peak of {label_of(found, response)} ({unit})", HALF_WIDTH)))
             if last > first:
                 axes.set_xlim(first - 0.03 * (last - first), last + 0.03 * (last - first))
         high = at.sel(percent=95.0)
@@ -68,19 +71,15 @@ def histogram_figure(result: ParameterStudy, measured: xr.Dataset, found: xr.Dat
         density.set_ylim(0, 1.25 * top)
         density.legend(fontsize=9, loc="upper right", frameon=True)
         cumulative.legend(fontsize=9, loc="lower right")
-        figure.suptitle(f"{wrapped(result.plan.title)}\nPeak of {LABEL} {words(response)}")
+        figure.suptitle(f"{wrapped(result.plan.title)}\nPeak of {label_of(found, response)}")
     return figure
 
 
 def band_figure(result: ParameterStudy, found: xr.Dataset, response: str) -> Figure:
-    """Return |mean| + 3 sigma over flight time: percentiles of the members, and the first-order band at the peak."""
-    data = result.data.sel(response=response)
+    """Return what peaks are of over flight time: percentiles of the members, and the first-order band at the peak."""
     factor, unit = displayed(found, response)
-    time = data["time"].values
-    members, nominal = (
-        factor * larger_side(data[f"{of}mean"].values, data[f"{of}std"].sel(source=COMBINED).values)
-        for of in ("", "nominal_")
-    )
+    time, label = result.data["time"].values, label_of(found, response)
+    members, nominal = (factor * values for values in loads(result, response))
     upper = members[result.computed]
     marker = "o" if time.size < 3 else None
     with rc_context(STYLE):
@@ -92,7 +91,7 @@ def band_figure(result: ParameterStudy, found: xr.Dataset, response: str) -> Fig
         median = np.median(upper, axis=0)
         axes.plot(time, median, color=COLORS["wind"], lw=1.6, label="median", marker=marker)
         axes.plot(time, nominal, ":", color="black", lw=1.6, label="nominal", marker=marker)
-        at = found.sel(measure=LARGER_SIDE, response=response)
+        at = found.sel(measure=timed(found, response), response=response)
         centre, sigma = (factor * at[name].item() for name in ("first_order_mean", "first_order_std"))
         if np.isfinite(sigma):
             half = float(stats.norm.ppf(0.95)) * sigma
@@ -105,16 +104,14 @@ def band_figure(result: ParameterStudy, found: xr.Dataset, response: str) -> Fig
         if stable.any() and not stable.all():
             shown = np.concatenate([upper[stable].ravel(), nominal])
             axes.set_ylim(shown.min() - 0.12 * np.ptp(shown), shown.max() + 0.12 * np.ptp(shown))
-        axes.set(xlabel="flight time (s)", ylabel=f"{LABEL} {words(response)} ({unit})")
-        axes.set_title(
-            f"{wrapped(result.plan.title)}\n{LABEL} {words(response)} of {upper.shape[0]} members", fontsize=11
-        )
+        axes.set(xlabel="flight time (s)", ylabel=f"{label} ({unit})")
+        axes.set_title(f"{wrapped(result.plan.title)}\n{label}, {upper.shape[0]} members", fontsize=11)
         axes.legend(fontsize=9)
     return figure
 
 
 def tornado_figure(result: ParameterStudy, found: xr.Dataset, response: str) -> Figure:
-    """Return the changes of the peak |mean| + 3 sigma, the largest on top, with the first-order ones as marks.
+    """Return the changes of the peak, the largest on top, with the first-order ones as marks.
 
     Members that are unstable or failed are named; the axis is that of the others.
     """
@@ -148,7 +145,7 @@ def tornado_figure(result: ParameterStudy, found: xr.Dataset, response: str) -> 
         axes.axvline(0, color="black", lw=0.6)
         axes.grid(axis="y", visible=False)
         nominal = factor * part["nominal"].item()
-        axes.set_xlabel(f"change of the peak {LABEL} {words(response)} from {nominal:.4g} {unit} ({unit})")
+        axes.set_xlabel(wrapped(f"change of the peak {label_of(found, response)} from {nominal:.4g} {unit} ({unit})"))
         axes.set_title(wrapped(result.plan.title), fontsize=11)
         figure.legend(fontsize=9, loc="outside lower center", ncols=3)
     return figure

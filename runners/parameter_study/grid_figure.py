@@ -8,15 +8,15 @@ from matplotlib import rc_context
 from matplotlib.figure import Figure
 
 from ...model.system.names import COMBINED
-from ..present.style import COLORS, STYLE, words, wrapped
-from ..statistics.larger_side import LABEL
+from ..present.style import COLORS, STYLE, wrapped
 from .compute import COMPUTED, FAILED, STATUS, UNSTABLE
 from .measures import PEAK, displayed
+from .measures import label as label_of
 from .run import ParameterStudy
 
 
 def grid_figure(result: ParameterStudy, measured: xr.Dataset, response: str) -> Figure:
-    """Return the peak |mean| + 3 sigma over one quantity as a line, over two as contours; of stable members."""
+    """Return the peaks of stable members over one quantity as a line, over two as contours."""
     factor, unit = displayed(measured, response)
     status = result.data["status"].values
     peak = np.full(status.size, np.nan)
@@ -24,7 +24,7 @@ def grid_figure(result: ParameterStudy, measured: xr.Dataset, response: str) -> 
     peak[status != COMPUTED] = np.nan
     values = result.data["value"].values
     labels = [q.name if q.unit == "1" else f"{q.name} ({q.unit})" for q in result.quantities]
-    label = f"peak {LABEL} {words(response)} ({unit})"
+    label = f"peak {label_of(measured, response)} ({unit})"
     nominal = [q.nominal for q in result.quantities]
     with rc_context(STYLE):
         figure = Figure(figsize=(8.0, 5.2), layout="constrained")

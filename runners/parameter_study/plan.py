@@ -154,7 +154,8 @@ class Dispersion(Section):
 class ParameterStudyPlan(Section):
     """The whole TOML file.
 
-    ``times`` are the vehicle's ``default_times``, ``responses`` and ``sources`` all of them where they are not given.
+    ``times`` are the vehicle's ``default_times``, ``responses``, resultants of both planes among them, and ``sources``
+    all of them where they are not given. With ``probability``, 1 - Phi(3) without it, a resultant passes its level.
     """
 
     format: Literal[1]
@@ -164,6 +165,7 @@ class ParameterStudyPlan(Section):
     responses: Names | None = None
     sources: Names | None = None
     relative_tolerance: Annotated[float, Field(ge=LEAST_TOLERANCE, le=LARGEST_TOLERANCE)] = 1e-4
+    probability: Annotated[float, Field(gt=0, lt=1)] | None = None
     grid: Grid | None = None
     one_at_a_time: OneAtATime | None = None
     dispersion: Dispersion | None = None

@@ -9,9 +9,8 @@ from rich.table import Table
 
 from ..present.style import words
 from ..present.terminal import print_whole
-from ..statistics.larger_side import LABEL
 from .compute import COMPUTED, FAILED, STATUS, UNSTABLE
-from .measures import LABELS, PEAK, displayed, nominal_side
+from .measures import LABELS, PEAK, displayed, label, nominal_side, timed
 from .run import ParameterStudy
 
 SHOWN_REASONS = 3
@@ -37,13 +36,15 @@ def print_spread(found: xr.Dataset, console: Console) -> None:
         part = found.sel(response=response)
         (factor, unit), time = displayed(found, response), part["peak_time"].item()
         title = f"{words(response).capitalize()} ({unit}) of {found.attrs['members']} members, with 95 % intervals"
-        title += f"; nominal peak: {nominal_side(found, response)}"
+        title += f"; nominal peak: {side}" if (side := nominal_side(found, response)) else f"; {label(found, response)}"
         table = Table("", title=title)
         rows: list[list[str]] = [["nominal"], ["mean"], ["σ"], ["first-order σ"], ["ratio of σ"], ["95 %"], ["99 %"]]
         for measure in _names(found, "measure"):
             at = part.sel(measure=measure)
-            label = LABELS[measure].replace("peak of ", "peak of\n")
-            table.add_column(label if measure == PEAK else f"{label}\nat {time:g} s", justify="right")
+            if np.isnan(at["nominal"].item()):
+                continue
+            head = LABELS[measure] if measure != PEAK else f"peak of\n{LABELS[timed(found, response)]}"
+            table.add_column(head if measure == PEAK else f"{head}\nat {time:g} s", justify="right")
             ranked = (
                 [at[f"percentile{end}"].sel(percent=p).item() for end in ("", "_low", "_high")] for p in (95.0, 99.0)
             )
@@ -60,7 +61,7 @@ def print_spread(found: xr.Dataset, console: Console) -> None:
         for row in rows:
             table.add_row(*row)
         print_whole(table, console)
-    table = Table("quantity", title=f"Shares in the spread of the peak {LABEL}, to first order")
+    table = Table("quantity", title="Shares in the spread of the peak, to first order")
     for response in _names(found, "response"):
         table.add_column(words(response), justify="right")
     shares = found["share"].sel(measure=PEAK)
@@ -76,7 +77,7 @@ def print_changes(found: xr.Dataset, console: Console) -> None:
         part = found.sel(measure=PEAK, response=response)
         factor, unit = displayed(found, response)
         nominal = _shown(part["nominal"].item(), factor, 4)
-        title = f"Peak {LABEL} {words(response)}, nominal {nominal} {unit} ({nominal_side(found, response)}): "
+        title = f"Peak {label(found, response)}, nominal {nominal} {unit}{_in_brackets(found, response)}: "
         title += f"changes ({unit})"
         table = Table("quantity", title=title)
         for column in ("value", "change", "first order"):
@@ -102,23 +103,30 @@ def print_changes(found: xr.Dataset, console: Console) -> None:
 def print_grid(result: ParameterStudy, measured: xr.Dataset, console: Console) -> None:
     """Print the least and the largest peak of every response, and the values at which they stand."""
     peak = measured["sample"].sel(measure=PEAK)
-    table = Table("response", "", title=f"Peak {LABEL} over the grid")
+    table = Table("response", "", title="Peaks over the grid")
     for column in ("peak", *(q.name if q.unit == "1" else f"{q.name} ({q.unit})" for q in result.quantities)):
         table.add_column(column, justify="right")
     for response in _names(measured, "response"):
         values = peak.sel(response=response).values
         factor, unit = displayed(measured, response)
-        label = f"{words(response)} ({unit}), {nominal_side(measured, response)}"
+        name = f"{label(measured, response)} ({unit})" + (
+            f", {side}" if (side := nominal_side(measured, response)) else ""
+        )
         nominal = measured["nominal"].sel(measure=PEAK, response=response).item()
         at = [f"{q.nominal:.5g}" for q in result.quantities]
-        table.add_row(label, "nominal", _shown(nominal, factor, 4), *at, end_section=not values.size)
+        table.add_row(name, "nominal", _shown(nominal, factor, 4), *at, end_section=not values.size)
         chosen = (("least", np.argmin), ("largest", np.argmax)) if values.size else ()
-        for name, find in chosen:
+        for which, find in chosen:
             k = int(find(values))
             row = result.data["value"].values[measured["member"].values[k]]
             cells = [_shown(values[k], factor, 4), *(f"{v:.5g}" for v in row)]
-            table.add_row("", name, *cells, end_section=name == "largest")
+            table.add_row("", which, *cells, end_section=which == "largest")
     print_whole(table, console)
+
+
+def _in_brackets(found: xr.Dataset, response: str) -> str:
+    side = nominal_side(found, response)
+    return f" ({side})" if side else ""
 
 
 def _names(dataset: xr.Dataset, name: str) -> list[str]:

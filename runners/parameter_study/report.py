@@ -17,7 +17,7 @@ from .changes import changes
 from .compute import STATUS
 from .dispersion_figures import band_figure, histogram_figure, tornado_figure
 from .grid_figure import grid_figure
-from .measures import PEAK, measures
+from .measures import LEVEL, PEAK, measures
 from .printout import print_changes, print_grid, print_reasons, print_spread
 from .run import ParameterStudy
 from .spread import spread
@@ -74,22 +74,29 @@ def _write_csv(path: Path, rows: Iterable[Iterable[str]]) -> Path:
 
 
 def member_rows(result: ParameterStudy, measured: xr.Dataset) -> list[list[str]]:
-    """Return one row a member: quantities, status, and the peak of |mean| + 3 sigma of each response, SI."""
+    """Return one row a member: quantities, status, and the peak of each response and resultant, SI."""
     data, responses = result.data, _names(measured, "response")
+    resultants = _names(data, "resultant") if LEVEL in data else []
     head = ["member", *(f"{q.name} ({q.unit})" for q in result.quantities), "status", "reason"]
     for response, unit in zip(responses, _names(measured, "unit"), strict=True):
-        head += [f"peak |mean| + 3 sigma of {response} ({unit})", f"at (s), {response}", f"side, {response}"]
+        of, last = (LEVEL, "direction (rad)") if response in resultants else ("|mean| + 3 sigma", "side")
+        head += [f"peak {of} of {response} ({unit})", f"at (s), {response}", f"{last}, {response}"]
     rows = [head]
     column = {int(m): i for i, m in enumerate(measured["member"].values)}
     peak, time = measured["sample"].sel(measure=PEAK).values, measured["member_peak_time"].values
-    sides = measured["member_peak_side"].values
+    blank = xr.full_like(measured["member_peak_time"], np.nan)
+    sides, directions = (measured.get(f"member_peak_{name}", blank).values for name in ("side", "direction"))
     for m, (row, status, reason) in enumerate(
         zip(data["value"].values, data["status"].values, data["reason"].values, strict=True)
     ):
         cells = [str(m), *map(_number, row), STATUS[status], str(reason)]
-        for r in range(len(responses)):
-            at = r, column.get(m, 0)
-            cells += [_number(peak[at]), _number(time[at]), str(sides[at])] if m in column else [""] * 3
+        for r, response in enumerate(responses):
+            if m not in column:
+                cells += [""] * 3
+                continue
+            at = r, column[m]
+            last = _number(directions[at]) if response in resultants else str(sides[at])
+            cells += [_number(peak[at]), _number(time[at]), last]
         rows.append(cells)
     return rows
 
@@ -104,6 +111,8 @@ def spread_rows(found: xr.Dataset) -> list[list[str]]:
     for measure in _names(found, "measure"):
         for response in _names(found, "response"):
             at = found.sel(measure=measure, response=response)
+            if np.isnan(at["nominal"].item()):  # a resultant has no mean and no sigma, a response no level
+                continue
             cells = [measure, response, at["unit"].item(), "" if measure == PEAK else _number(at["peak_time"].item())]
             cells += [_number(at[name].item()) for name in names]
             for p in percents:
@@ -118,6 +127,8 @@ def change_rows(found: xr.Dataset) -> list[list[str]]:
     rows = [["measure", "response", "unit", "at (s)", "quantity", "quantity_unit", "value", "status", *numbers]]
     for measure in _names(found, "measure"):
         for response in _names(found, "response"):
+            if np.isnan(found["nominal"].sel(measure=measure, response=response).item()):
+                continue
             for quantity in _names(found, "quantity"):
                 for end in _names(found, "end"):
                     at = found.sel(measure=measure, response=response, quantity=quantity, end=end)

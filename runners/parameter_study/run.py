@@ -14,12 +14,15 @@ from numpy.typing import NDArray
 
 from ...model.errors import DataError, OutputFolderError, ParameterValueError, UnknownNameError
 from ...model.system.names import COMBINED
+from ...model.vehicle.planes import PLANES
 from ..case.provenance import provenance
 from ..case.times import parse_times
 from ..present.files import write_bytes
 from ..present.netcdf import RULE, one_unit_a_variable, with_conventions
 from ..present.notebook import html_of, shortened
 from ..statistics.dataset import QUANTITIES
+from ..statistics.norm import LIKE_3_SIGMA
+from ..statistics.resultants import MEANINGS, labels_of, response_or_resultant, resultant_pairs
 from ..statistics.sweep import Sweep
 from ..study import Study
 from .cluster import compute_on_cluster
@@ -28,7 +31,7 @@ from .local import compute_locally
 from .plan import ParameterStudyPlan, read_plan
 from .quantities import Quantity, resolve_quantities
 from .sampling import member_values
-from .store import ChunkStore, identity_of, netcdf_bytes, open_store
+from .store import DIMENSIONS, ChunkStore, identity_of, netcdf_bytes, open_store
 
 RESULT_FILE = "study.nc"
 LARGEST = 2**31  # bytes of a variable in the file format
@@ -50,7 +53,10 @@ class ParameterStudy:
     data : xarray.Dataset
         ``value`` (member, quantity); ``status`` (member: 0 computed, 1 unstable, 2 failed) and ``reason``;
         ``mean`` (member, time, response) and ``std`` (member, time, response, source), NaN where a member failed;
-        ``nominal_mean`` and ``nominal_std`` of the unchanged study.
+        ``nominal_mean`` and ``nominal_std`` of the unchanged study. Of resultants of both planes ``plane_mean``
+        (member, time, resultant, plane), ``plane_covariance`` (member, time, resultant, source, plane, other_plane)
+        and ``level`` (member, time, resultant), which is passed with the probability in the attributes; each with its
+        ``nominal_...``.
     """
 
     plan: ParameterStudyPlan
@@ -63,13 +69,19 @@ class ParameterStudy:
         """Members that have numbers, (members,)."""
         return self.data["status"].values != FAILED
 
+    @property
+    def names(self) -> list[str]:
+        """Names of the responses, then of the resultants."""
+        resultants = self.data["resultant"].values if "resultant" in self.data else ()
+        return [str(name) for name in (*self.data["response"].values, *resultants)]
+
     def __repr__(self) -> str:
         failed, times = int((~self.computed).sum()), self.data["time"].values
         lines = [
             f"ParameterStudy of {self.study.system.name}, {self.plan.kind.replace('_', ' ')}",
             f"members: {self.computed.size}" + (f", {failed} of them failed" if failed else ""),
             f"varied: {shortened([q.name for q in self.quantities])}",
-            f"responses: {shortened([str(name) for name in self.data['response'].values])}",
+            f"responses: {shortened(self.names)}",
             f"end times: {times.size}, {times[0]:g} to {times[-1]:g} s",
         ]
         return "\n  ".join(lines)
@@ -145,15 +157,33 @@ def _task(study: Study, plan: ParameterStudyPlan, quantities: tuple[Quantity, ..
     for source in plan.sources or ():
         if source not in known:
             raise UnknownNameError("noise source", source, known)
-    return Task(quantities, tuple(times), tuple(study.checked_responses(plan.responses)), plan.relative_tolerance)
+    responses, resultants = _names(study, plan)
+    if plan.probability is not None and not resultants:
+        raise DataError(
+            "is that of resultants of both planes, and none is asked for; leave it out", column="probability"
+        )
+    chance = LIKE_3_SIGMA if plan.probability is None else plan.probability
+    return Task(quantities, tuple(times), responses, resultants, plan.relative_tolerance, chance)
+
+
+def _names(study: Study, plan: ParameterStudyPlan) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return responses and resultants that a plan asks for; without names all that there are."""
+    pairs, outputs = resultant_pairs(study.system.output_names), study.system.outputs
+    if plan.responses is None:
+        units = {output.name: output.unit for output in outputs}
+        alike = (name for name, (first, second) in pairs.items() if units[first] == units[second])
+        return tuple(study.checked_responses(None)), tuple(alike)
+    asked = [response_or_resultant(study, name) for name in plan.responses]
+    return tuple(n for n in asked if n not in pairs), tuple(n for n in asked if n in pairs)
 
 
 def _check_size(study: Study, task: Task, members: int) -> None:
-    size = 8 * members * len(task.times) * len(task.responses) * (len(study.system.sources) + 1)
-    if size > LARGEST:
+    over, sources = 8 * members * len(task.times), len(study.system.sources) + 1
+    deviations, covariances = over * len(task.responses) * sources, 4 * over * sources * bool(task.resultants)
+    if (size := max(deviations, covariances)) > LARGEST:
         raise DataError(
-            f"{members} members at {len(task.times)} end times make {size / 1e9:.3g} GB of standard deviations, more "
-            "than a result file holds; take fewer times, responses or members"
+            f"{members} members at {len(task.times)} end times make {size / 1e9:.3g} GB of standard deviations or "
+            "covariances, more than a result file holds; take fewer times, responses or members"
         )
 
 
@@ -233,7 +263,31 @@ def _dataset(
     for name in ("mean", "std"):
         data[name].attrs |= {RULE: "response", "long_name": f"{QUANTITIES[name]} of a member"}
         data[f"nominal_{name}"].attrs |= {RULE: "response", "long_name": f"{QUANTITIES[name]}, nothing varied"}
-    return data
+    return _with_resultants(data, study, task, found, nominal) if task.resultants else data
+
+
+def _with_resultants(
+    data: xr.Dataset, study: Study, task: Task, found: list[ChunkResult], nominal: ChunkResult
+) -> xr.Dataset:
+    names = ("plane_mean", "plane_covariance", "level")
+    members = {name: np.concatenate([getattr(r, name) for r in found]) for name in names}
+    of_nominal = {name: getattr(nominal, name)[0] for name in names}
+    sources = data["source"].values.tolist()
+    for part in (members, of_nominal):
+        part["plane_covariance"] = _by_source(study, sources, part["plane_covariance"], axis=-3)
+    variables = {}
+    for name in names:
+        meaning, rule = MEANINGS[name]
+        dims, attributes = ("time", *DIMENSIONS[name][1:]), {RULE: rule}
+        variables[name] = (("member", *dims), members[name], attributes | {"long_name": f"{meaning}, of a member"})
+        variables[f"nominal_{name}"] = dims, of_nominal[name], attributes | {"long_name": f"{meaning}, nothing varied"}
+    coordinates = {
+        "resultant": list(task.resultants),
+        "resultant_unit": ("resultant", [labels_of(study, name)[0].unit for name in task.resultants]),
+        "plane": list(PLANES),
+        "other_plane": list(PLANES),
+    }
+    return data.assign(variables).assign_coords(coordinates).assign_attrs(probability=task.probability)
 
 
 def stored_layout(data: xr.Dataset) -> xr.Dataset:
@@ -241,14 +295,21 @@ def stored_layout(data: xr.Dataset) -> xr.Dataset:
     nominal = data["quantity_nominal"].reset_coords(drop=True).assign_attrs({RULE: "quantity", "long_name": "nominal"})
     data = data.drop_vars("quantity_nominal").assign(nominal_value=nominal)
     units = {"response": data["unit"].values.tolist(), "quantity": data["quantity_unit"].values.tolist()}
+    if "resultant" in data:
+        units["resultant"] = data["resultant_unit"].values.tolist()
     return with_conventions(one_unit_a_variable(data, units))
 
 
 def _std(study: Study, sources: list[str], variance: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the standard deviations of chosen sources; all of them stand behind the combined one."""
+    return np.sqrt(_by_source(study, sources, variance, axis=-1))
+
+
+def _by_source(study: Study, sources: list[str], values: NDArray[np.float64], axis: int) -> NDArray[np.float64]:
+    """Return what chosen sources have of values by source along an axis, or all together."""
     names = list(study.system.sources)
-    columns = [variance.sum(axis=-1) if s == COMBINED else variance[..., names.index(s)] for s in sources]
-    return np.sqrt(np.stack(columns, axis=-1))
+    columns = [values.sum(axis) if s == COMBINED else values.take(names.index(s), axis) for s in sources]
+    return np.stack(columns, axis)
 
 
 def _nominal(study: Study, task: Task) -> ChunkResult:

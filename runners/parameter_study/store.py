@@ -28,6 +28,13 @@ log = logging.getLogger(__name__)
 
 IDENTITY_FILE = "identity.json"
 CHUNKS = "chunks"
+DIMENSIONS = {  # beside the member's
+    "mean": ("time", "response"),
+    "variance": ("time", "response", "source"),
+    "plane_mean": ("time", "resultant", "plane"),
+    "plane_covariance": ("time", "resultant", "source", "plane", "other_plane"),
+    "level": ("time", "resultant"),
+}
 
 
 class ResumeError(AscentwindError):
@@ -67,8 +74,11 @@ class ChunkStore:
         """
         dataset = xr.Dataset(
             {
-                "mean": (("member", "time", "response"), result.mean),
-                "variance": (("member", "time", "response", "source"), result.variance),
+                **{
+                    name: (("member", *dims), result.numbers[name])
+                    for name, dims in DIMENSIONS.items()
+                    if result.numbers[name].size  # the file format has no empty dimension
+                },
                 "status": ("member", result.status),
             },
             attrs={"key": self.key, "reason": json.dumps(result.reason), "sha256": _hash(result)},
@@ -83,10 +93,9 @@ class ChunkStore:
         try:
             with xr.open_dataset(path, engine="scipy") as stored:
                 result = ChunkResult(
-                    stored["mean"].values,
-                    stored["variance"].values,
-                    stored["status"].values.astype(np.int8),
-                    tuple(json.loads(stored.attrs["reason"])),
+                    **{name: _values(stored, name) for name in DIMENSIONS},
+                    status=stored["status"].values.astype(np.int8),
+                    reason=tuple(json.loads(stored.attrs["reason"])),
                 )
                 if stored.attrs["key"] == self.key and stored.attrs["sha256"] == _hash(result):
                     return result
@@ -96,9 +105,16 @@ class ChunkStore:
         return None
 
 
+def _values(stored: xr.Dataset, name: str) -> NDArray[np.float64]:
+    """Return what is stored under a name; nothing was written of what has no responses or no resultants."""
+    if name in stored:
+        return stored[name].values
+    return np.empty(tuple(stored.sizes.get(dim, 0) for dim in ("member", *DIMENSIONS[name])))
+
+
 def _hash(result: ChunkResult) -> str:
     digest = hashlib.sha256(json.dumps(result.reason).encode())
-    for array in (result.mean, result.variance, result.status):
+    for array in (*result.numbers.values(), result.status):
         digest.update(np.ascontiguousarray(array).tobytes())
     return digest.hexdigest()
 
