@@ -14,6 +14,7 @@ PAGE = Path(__file__).parents[1] / "docs" / "tables.md"
 SIGNS = {"+": "above 0", "0": "0 or above", "": ""}
 TABLES: tuple[tuple[str, Sequence[c.Column]], ...] = (
     ("`[tables.rigid_body]`", (c.TIME, *c.RIGID_BODY)),
+    ("`[tables.product_of_inertia]`, which couples both planes", (c.TIME, c.PRODUCT_OF_INERTIA)),
     ("`[tables.trajectory]`", (c.TIME, *c.TRAJECTORY)),
     ("`[tables.trajectory]`, for `options.trajectory_angle_of_attack`", tuple(c.OWN_ANGLE.values())),
     ("`[tables.trajectory]`, for `wind.azimuth_change`", (c.AZIMUTH_CHANGE,)),

@@ -11,10 +11,12 @@ from ..system.labels import Noise, Output, State, block_of
 from ..system.linear_system import LinearSystem
 from ..system.names import TURBULENCE, UNDISTURBED, WIND
 from ..vehicle.biases import check_biases
+from ..vehicle.columns import PRODUCT_OF_INERTIA
 from ..vehicle.planes import flown_planes
 from ..vehicle.vehicle import Vehicle
 from ..wind.record import COMPONENTS
 from .block import Block
+from .coupled_planes import coupled
 from .noise import NoiseProcess, deviation_block
 from .plane import PlaneEquations, Winds, plane_equations
 from .structure import structure_in_words
@@ -27,8 +29,8 @@ from .wind import WindBlock, wind_block
 def assemble(vehicle: Vehicle, wind_start_covariance: np.ndarray) -> LinearSystem:
     """Return the linear system of a vehicle in its wind.
 
-    In both planes it is the equations of each, one after the other, which meet in the wind filter and in the deviations
-    that they have in common.
+    In both planes it is the equations of each, one after the other, which meet in the wind filter, in the deviations
+    that they have in common, and in a product of inertia.
 
     Parameters
     ----------
@@ -53,6 +55,10 @@ def assemble(vehicle: Vehicle, wind_start_covariance: np.ndarray) -> LinearSyste
         tuple(numbers[0].mean_scale * tables[f"wind.mean{name.removeprefix(WIND)}"] for name in names),
     )
     parts = [plane_equations(*of_plane, winds) for of_plane in zip(planes, numbers, turbulence, strict=True)]
+    matrices = [part.matrix for part in parts]
+    if PRODUCT_OF_INERTIA.name in tables:
+        parts, determinant = coupled(parts[0], parts[1], tables[PRODUCT_OF_INERTIA.name])
+        matrices.append(determinant)
     processes = shared.processes
     blocks = [
         *(block for part in parts for block in part.blocks),
@@ -87,7 +93,7 @@ def assemble(vehicle: Vehicle, wind_start_covariance: np.ndarray) -> LinearSyste
         discontinuities=vehicle.discontinuities,
         start=vehicle.start,
         end=vehicle.end,
-        coupling_matrix=ca.diagcat(*(part.matrix for part in parts)),
+        coupling_matrix=ca.diagcat(*matrices),
         structure=structure_in_words(vehicle, len(states), shared.groups),
     )
 

@@ -109,7 +109,7 @@ def deviation_column(
     angles = motion.alpha, motion.beta, motion.attitude
     symbols = ca.vertcat(*angles, handles.moved, handles.couple, numbers.undisturbed, motion.zone_angles)
     column = ca.substitute(column, symbols, at_mean)
-    if ca.depends_on(column, equations.states):
+    if ca.depends_on(column, ca.vertcat(equations.states, handles.other_plane)):
         raise _refusal(
             vehicle,
             name,

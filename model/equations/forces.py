@@ -8,7 +8,7 @@ import casadi as ca
 
 from ..system.symbols import TableSymbols
 from ..vehicle.biases import CENTER_OF_GRAVITY_OFFSET
-from ..vehicle.columns import MOVED_MODE
+from ..vehicle.columns import MOVED_MODE, PRODUCT_OF_INERTIA
 from ..vehicle.noise_loads import needed_columns
 from ..vehicle.vehicle import Vehicle
 from . import bending, rigid_body, slosh
@@ -32,19 +32,23 @@ class Handles:
         Couple on the whole vehicle (N m): zero.
     bent_thrust : SX
         Thrust on the displaced gimbal (N): the table, whose deviations it does not follow.
+    other_plane : SX
+        Couple by the turning of the other plane (N m), where a product of inertia couples both; solved where both meet.
     """
 
     moved: ca.SX
     couple: ca.SX
     bent_thrust: ca.SX
+    other_plane: ca.SX
 
     @staticmethod
     def new() -> Handles:
         """Declare the symbols."""
-        return Handles(*(ca.SX.sym(name) for name in ("moved", "couple", "bent_thrust")))
+        return Handles(*(ca.SX.sym(name) for name in ("moved", "couple", "bent_thrust", "other_plane")))
 
     @property
     def vector(self) -> ca.SX:
+        """Those that have a value in one plane."""
         return ca.vertcat(self.moved, self.couple, self.bent_thrust)
 
     @staticmethod
@@ -81,6 +85,8 @@ def solved_motion(vehicle: Vehicle, numbers: Numbers, motion: Motion, handles: H
         moment -= handles.bent_thrust * bending.gimbal_displacement(tables, eta)
     if CENTER_OF_GRAVITY_OFFSET in numbers.biases:
         moment += handles.couple
+    if PRODUCT_OF_INERTIA.name in tables:
+        moment += handles.other_plane
     modal_force = bending.generalized_force(tables, area, numbers.bending_damping, eta, eta_rate, alpha, beta)
     if MOVED_MODE in needed_columns(vehicle.file)[1]:
         modal_force += moved_modal_force(tables, area, modes, alpha) * handles.moved

@@ -57,6 +57,8 @@ class PlaneEquations:
     output : SX
     matrix : SX
         Of the coupled accelerations, inverted in the equations.
+    rotation, couple : SX
+        Acceleration of the attitude (rad/s2), and the couple of the other plane (N m) that is to be put in.
     """
 
     blocks: tuple[Block, ...]
@@ -64,6 +66,8 @@ class PlaneEquations:
     labels: tuple[Output, ...]
     output: ca.SX
     matrix: ca.SX
+    rotation: ca.SX
+    couple: ca.SX
 
 
 def plane_equations(plane: Plane, numbers: Numbers, turbulence: ca.SX, winds: Winds) -> PlaneEquations:
@@ -109,7 +113,10 @@ def plane_equations(plane: Plane, numbers: Numbers, turbulence: ca.SX, winds: Wi
     rates[0] -= rigid_body.normal_force_slope(numbers.tables, numbers.area) * own / numbers.tables["mass"]
     blocks = _with_rates(blocks, rates, plane.prefix)
     labels = tuple(_named(plane, label) for label, _ in responses)
-    return PlaneEquations(tuple(blocks[:moving]), tuple(blocks[moving:]), labels, output, solved.matrix)
+    rotation = next(b.rates for b in blocks if b.states[0].name == f"{plane.prefix}attitude_rate")
+    return PlaneEquations(
+        tuple(blocks[:moving]), tuple(blocks[moving:]), labels, output, solved.matrix, rotation, handles.other_plane
+    )
 
 
 def in_plane(plane: Plane, numbers: Numbers, winds: Sequence[ca.SX]) -> ca.SX:

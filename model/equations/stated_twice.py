@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..errors import PlausibilityWarning
 from ..files.csv_table import CsvTable, read_csv_table
 from ..files.folder_files import file_inside
-from ..vehicle.columns import RADIUS, TIME, local_columns
+from ..vehicle.columns import MOVED_MODE, RADIUS, TIME, local_columns
 from ..vehicle.loads import AXIAL_FORCE, BENDING_MOMENT, SHEAR_FORCE
 from ..vehicle.shipped import VEHICLE_FILE
 from ..vehicle.vehicle import Vehicle
@@ -32,7 +32,8 @@ def compare_stated_twice(vehicle: Vehicle) -> None:
     mass times X_CG - x, S_2 the moment of inertia and slosh minus its mass times x_S - x; shear and axial force have
     the mass. From station to station the inertia of a mode is minus the mass between them times its displacement there.
     The integral of c'_N times x - X_CG is C'_N (X_CP - X_CG). A construction beside the vehicle
-    has its reference area.
+    has its reference area. The integral of c'_N times the slope of a mode's axis stands in that mode's table too, where
+    the centre of pressure deviates.
 
     Raises
     ------
@@ -152,7 +153,17 @@ def _compare_arm(vehicle: Vehicle) -> None:
     made = slope * (pressure - gravity)
     what = "normal_force_slope, center_of_pressure and center_of_gravity"
     _tell(entry.file, arm.name, time, stated[np.isin(all_times, time)], made, what)
+    _compare_slopes(vehicle, csv, time)
     _compare_products(vehicle, csv, time)
+
+
+def _compare_slopes(vehicle: Vehicle, csv: CsvTable, time: NDArray[np.float64]) -> None:
+    for i, mode in enumerate(vehicle.file.bending, start=1):
+        table, name = f"bending.{i}.{MOVED_MODE.name}", f"slope_{i}"
+        if table in vehicle.tables:
+            stated = csv.column(name, MOVED_MODE.unit)[np.isin(csv.columns[TIME.name], time)]
+            made, what = _at(vehicle, table, time), f"{MOVED_MODE.name} of {mode.table.file}"
+            _tell(csv.file.name, name, time, stated, made, what)
 
 
 def _compare_products(vehicle: Vehicle, csv: CsvTable, time: NDArray[np.float64]) -> None:

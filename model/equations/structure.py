@@ -22,6 +22,8 @@ def _planes(file: VehicleFile) -> str:
         each += [bias.source for bias in vehicle_biases(file).values() if not bias.common and bias.unit == "1"]
     apart = (f"{name} in each" for name in each)
     roll = [] if file.roll_deg is None else ["rolled"]
+    if file.tables.product_of_inertia is not None:
+        roll.append("coupled by a product of inertia")
     return "; ".join([file.planes, f"wind {file.wind.pitch_wind} in pitch", *turns, *speed, *roll, *own, *apart])
 
 

@@ -31,6 +31,9 @@ RIGID_BODY = (
     Column("moment_of_inertia", "kg m2", "+", "in pitch and yaw about the centre of gravity, all liquid frozen"),
     Column("center_of_gravity", "m", "", "forward of the gimbal plane"),
 )
+PRODUCT_OF_INERTIA = Column(
+    "product_of_inertia", "kg m2", "", "of the vehicle's planes: sum over the masses of Y_pitch Y_yaw"
+)
 TRAJECTORY = (
     Column("altitude", "m", "", "above sea level; increases"),
     Column("relative_velocity", "m/s", "+", "speed through air without wind"),
@@ -167,8 +170,8 @@ def local_columns(modes: int) -> tuple[Column, ...]:
         Column("arm", "m/rad", "", "integral of c'_N times arm"),
         Column("arm_squared", "m2/rad", "0", "of c'_N times arm squared"),
         *(Column(f"arm_displacement_{i}", "m/rad", "", f"of c'_N times arm times Y_{i}") for i in numbers),
-        *(Column(f"slope_{i}", "1/m/rad", "", f"of c'_N times Y'_{i}") for i in numbers),
-        *(Column(f"arm_slope_{i}", "1/rad", "", f"of c'_N times arm times Y'_{i}") for i in numbers),
+        *(Column(f"slope_{i}", "1/m/rad", "", f"of c'_N times dY_{i}/dx, the slope of the axis") for i in numbers),
+        *(Column(f"arm_slope_{i}", "1/rad", "", f"of c'_N times arm times dY_{i}/dx") for i in numbers),
         *(
             Column(f"displacement_{i}_displacement_{j}", "1/rad", "", f"of c'_N times Y_{i} Y_{j}")
             for i in numbers
@@ -176,7 +179,7 @@ def local_columns(modes: int) -> tuple[Column, ...]:
             if j >= i
         ),
         *(
-            Column(f"displacement_{i}_slope_{j}", "1/m/rad", "", f"of c'_N times Y_{i} Y'_{j}")
+            Column(f"displacement_{i}_slope_{j}", "1/m/rad", "", f"of c'_N times Y_{i} dY_{j}/dx")
             for i in numbers
             for j in numbers
         ),

@@ -36,6 +36,7 @@ from .columns import (
     MOVED_MODE,
     OWN_ANGLE,
     PREFIX,
+    PRODUCT_OF_INERTIA,
     PROPULSION,
     RIGID_BODY,
     SCHEDULE,
@@ -121,6 +122,9 @@ def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehi
     if file.roll_deg is not None and file.planes != BOTH:
         why = f'turns both planes, and planes = "{file.planes}"; fly "both" or leave it out'
         reader.collector.errors.append(DataError(why, file=toml, column="roll_deg"))
+    if file.tables.product_of_inertia is not None and file.planes != BOTH:
+        why = f'couples both planes, and planes = "{file.planes}"; fly "both" or leave it out'
+        reader.refuse(why, "tables.product_of_inertia")
     for key, asked, why in (
         ("wind.air_speed", file.wind.air_speed != "no_wind", "the wind of the yaw plane blows across the path"),
         ("options.wind_biased_programme", file.options.wind_biased_programme, "the tilt programme is that of pitch"),
@@ -150,6 +154,8 @@ def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehi
         for name in names:
             with reader.collector.part():
                 _add_plane(reader, file, name)
+        if file.tables.product_of_inertia is not None:
+            reader.add("product_of_inertia", file.tables.product_of_inertia, (PRODUCT_OF_INERTIA,))
     wind = turbulence = None
     with reader.collector.part():
         wind = _load_both(file.wind, reader) if file.planes == BOTH else _load_wind(file, reader)
@@ -199,11 +205,33 @@ def load_vehicle(folder: Path, changes: Mapping[str, Any] | None = None) -> Vehi
     for plane in flown_planes(vehicle):
         with reader.collector.part():
             check_plausibility(plane.vehicle)
+    with reader.collector.part():
+        _check_product_of_inertia(vehicle)
     _check_coverage(reader, wind, turbulence, start, last.last)
     reader.collector.raise_all()
     if file.wind.air_speed == "mean_wind":
         vehicle = through_mean_wind(vehicle)
     return with_biased_programme(vehicle) if file.options.wind_biased_programme else vehicle
+
+
+def _check_product_of_inertia(vehicle: Vehicle) -> None:
+    """Refuse a product of inertia beyond the root of the moments of inertia: no masses have it."""
+    product = vehicle.tables.get(PRODUCT_OF_INERTIA.name)
+    if product is None:
+        return
+    moments = [plane.vehicle.tables["moment_of_inertia"] for plane in flown_planes(vehicle)]
+    times = np.unique(np.concatenate([table.argument for table in (product, *moments)]))
+    times = times[(times >= vehicle.start) & (times <= vehicle.end)]
+    stated, pitch, yaw = (np.asarray(table.polynomial(times)) for table in (product, *moments))
+    beyond = np.flatnonzero(np.abs(stated) >= np.sqrt(pitch * yaw))
+    if beyond.size:
+        k = beyond[0]
+        raise DataError(
+            f"is {stated[k]:g} kg m2 at {times[k]:g} s, not below the root of the moments of inertia in pitch and yaw, "
+            f"{np.sqrt(pitch[k] * yaw[k]):g} kg m2; no masses have that",
+            file=next(s.file for s in vehicle.sources if s.name == PRODUCT_OF_INERTIA.name),
+            column=PRODUCT_OF_INERTIA.label,
+        )
 
 
 # columns of the trajectory that an option asks for, and it

@@ -27,6 +27,8 @@ def table_columns(file: VehicleFile) -> dict[str, tuple[Column, ...]]:
         **{sensor.modes.file: c.mode_columns(modes) for sensor in control.load_relief.values() if sensor.modes},
         **{sensor.schedule.file: c.SCHEDULE for sensor in control.load_relief.values() if sensor.schedule},
     }
+    if tables.product_of_inertia:
+        found[tables.product_of_inertia.file] = (c.PRODUCT_OF_INERTIA,)
     if tables.local_aerodynamics:
         found[tables.local_aerodynamics.file] = c.local_columns(modes)
     found = {name: (c.TIME, *columns) for name, columns in found.items()}

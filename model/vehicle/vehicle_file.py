@@ -328,6 +328,7 @@ class TablesEntry(Section):
     trajectory: TableEntry
     propulsion: TableEntry
     aerodynamics: TableEntry
+    product_of_inertia: TableEntry | None = None
     local_aerodynamics: TableEntry | None = None
     loads_along_vehicle: TableEntry | None = None
     shear_along_vehicle: TableEntry | None = None

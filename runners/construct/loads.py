@@ -60,8 +60,8 @@ class LoadedVehicle:
         N, at the gimbal plane.
     relative_velocity : float
         m/s.
-    displacement, rotation : (modes, points) arrays
-        Of the modes (1; 1/m).
+    displacement, rotation, slope : (modes, points) arrays
+        Of the modes (1; 1/m; 1/m): where the axis lies, how sections turn, and dY/dx of the axis, shear strain too.
     slosh_mass, slosh_point : (tanks,) arrays
         kg; attach points in m forward of the gimbal plane.
     """
@@ -75,6 +75,7 @@ class LoadedVehicle:
     relative_velocity: float
     displacement: NDArray[np.float64]
     rotation: NDArray[np.float64]
+    slope: NDArray[np.float64]
     slosh_mass: NDArray[np.float64]
     slosh_point: NDArray[np.float64]
 
@@ -226,7 +227,7 @@ def _lateral(
         first_moment=first,
         second_moment=second,
         attitude_rate=-free(air * arm) / vehicle.relative_velocity,
-        bending_displacement=free(air * vehicle.rotation),
+        bending_displacement=free(air * vehicle.slope),
         bending_rate=-free(air * vehicle.displacement) / vehicle.relative_velocity,
         inertia=inertia,
     )

@@ -147,7 +147,7 @@ def _bending(numbers: VehicleNumbers, mode: int) -> Columns:
 
     points = {tank: found.attach_point for tank, found in numbers.slosh.items()}
     force = numbers.line.total(numbers.intensity * numbers.displacement[:, mode])
-    moved = numbers.line.total(numbers.intensity * numbers.line.slope(modes.x, shapes[0]))
+    moved = numbers.line.total(numbers.intensity * numbers.slope[:, mode])
     return {
         ("frequency", "rad/s"): modes.frequency[:, mode],
         ("generalized_mass", "kg"): modes.generalized_mass[:, mode],
@@ -237,17 +237,17 @@ def _strips(numbers: VehicleNumbers, start: float) -> Columns:
 def _local_integrals(numbers: VehicleNumbers) -> Columns:
     """Return the columns of model/vehicle/columns.py: local_columns."""
     arm = numbers.line.points - numbers.properties.center_of_gravity[:, None]
-    Y, turn = np.moveaxis(numbers.displacement, 1, 0), np.moveaxis(numbers.rotation, 1, 0)
+    Y, slope = np.moveaxis(numbers.displacement, 1, 0), np.moveaxis(numbers.slope, 1, 0)
     modes = range(numbers.construction.bending_modes)
     densities = {
         ("arm", "m/rad"): arm,
         ("arm_squared", "m2/rad"): arm**2,
         **{(f"arm_displacement_{i + 1}", "m/rad"): arm * Y[i] for i in modes},
-        **{(f"slope_{i + 1}", "1/m/rad"): turn[i] for i in modes},
-        **{(f"arm_slope_{i + 1}", "1/rad"): arm * turn[i] for i in modes},
+        **{(f"slope_{i + 1}", "1/m/rad"): slope[i] for i in modes},
+        **{(f"arm_slope_{i + 1}", "1/rad"): arm * slope[i] for i in modes},
         **{
             (f"displacement_{i + 1}_displacement_{j + 1}", "1/rad"): Y[i] * Y[j] for i in modes for j in modes if j >= i
         },
-        **{(f"displacement_{i + 1}_slope_{j + 1}", "1/m/rad"): Y[i] * turn[j] for i in modes for j in modes},
+        **{(f"displacement_{i + 1}_slope_{j + 1}", "1/m/rad"): Y[i] * slope[j] for i in modes for j in modes},
     }
     return {key: numbers.line.total(numbers.intensity * density) for key, density in densities.items()}

@@ -45,8 +45,8 @@ class VehicleNumbers:
         Cut wherever a distribution may bend or jump, and at the stations.
     intensity : (t, points) array
         Local normal-force slope c'_N at the line's points (1/rad/m).
-    displacement, rotation : (t, modes, points) arrays
-        Of the modes at the line's points (1, 1/m).
+    displacement, slope : (t, modes, points) arrays
+        Of the modes at the line's points (1, 1/m): where the axis lies, and dY/dx of it, which the air meets.
     stations : (s,) array
         m forward of the gimbal plane, load stations among them.
     loads, shears : tuples of LoadCoefficients
@@ -65,7 +65,7 @@ class VehicleNumbers:
     line: Line
     intensity: Array
     displacement: Array
-    rotation: Array
+    slope: Array
     stations: Array
     loads: tuple[LoadCoefficients, ...]
     shears: tuple[LoadCoefficients, ...]
@@ -113,6 +113,7 @@ def compute_vehicle(
     line = Line.cut_at(modes.x, aerodynamics.knots(construction), stations)
     intensity = aerodynamics.intensity(construction, flight.mach, line.points, flight.time)
     displacement, rotation = (line.linear(modes.x, shape) for shape in (modes.displacement, modes.rotation))
+    inclination = line.slope(modes.x, modes.displacement)
     mass = line.spread(modes.x, mass_line(construction, modes.x, flight.liquid))
     rotary = np.broadcast_to(line.spread(modes.x, rotary_line(construction, modes.x, flight.liquid)), mass.shape)
     at_stations = aerodynamics.intensity(construction, flight.mach, stations + JUST_FORWARD, flight.time)
@@ -128,6 +129,7 @@ def compute_vehicle(
             relative_velocity=float(flight.relative_velocity[row]),
             displacement=displacement[row],
             rotation=rotation[row],
+            slope=inclination[row],
             slosh_mass=np.array([tank.mass[row] for tank in slosh.values()]),
             slosh_point=np.array([tank.attach_point[row] for tank in slosh.values()]),
         )
@@ -147,7 +149,7 @@ def compute_vehicle(
     done(STEPS[5])
     return VehicleNumbers(
         construction, flight, properties, slope, center, slosh, modes,
-        line, intensity, displacement, rotation, stations, loads, shears, axial,
+        line, intensity, displacement, inclination, stations, loads, shears, axial,
     )  # fmt: skip
 
 

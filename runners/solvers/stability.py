@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ...codegen.system.executable import ExecutableSystem
 from ...model.errors import DataError, SingularCouplingError, UnstableSystemWarning
 from ...model.tables import table_values
+from ...model.vehicle.columns import PRODUCT_OF_INERTIA
 from .time_nodes import interval_after, intervals
 
 UNSTABLE = 1e-6  # rad/s; a real part below is rounding or an integrator
@@ -109,4 +110,9 @@ def check_coupling(executable: ExecutableSystem) -> None:
             raise SingularCouplingError(
                 f"at {time:.4g} s the mass matrix of bending and slosh is singular: the slosh masses, weighed by their "
                 "mode displacements, reach the generalised masses; check both tables there"
+                + (
+                    ", and the product of inertia"
+                    if any(PRODUCT_OF_INERTIA.name in g.names for g in system.tables)
+                    else ""
+                )
             )

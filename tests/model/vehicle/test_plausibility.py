@@ -299,6 +299,11 @@ BESIDE = {  # file, change, what run tells
         scaled("mass", 0.4536),
         "'slosh_s1_rp1'.*but mass and attach_point of s1_rp1 make",
     ),
+    "rotation of the section for the slope of the axis": (
+        "local_aerodynamics.csv",
+        scaled("slope_1", 0.97),
+        "'slope_1'.*but normal_force_slope_times_slope of bending_1.csv make",
+    ),
     "another radius": (
         "axial_along_vehicle.csv",
         scaled("radius", 2.0),

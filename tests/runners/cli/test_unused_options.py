@@ -116,7 +116,7 @@ KNOWN = {
     "tolerance": {"times", "out", "changes"},
     "sensitivity": {"response", "time", "source", "quantity", "probability", "out", "turbulence", "changes"},
     "equations": {"of", "by", "page", "changes"},
-    "study": {"out", "scheduler"},
+    "study": {"changes", "out", "scheduler"},
     "mean": {"out", "changes"},
     "design": {"out", "trades", "changes"},
     "reproduce": {"out"},

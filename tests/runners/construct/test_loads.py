@@ -32,12 +32,13 @@ def vehicle() -> LoadedVehicle:
     rng = np.random.default_rng(2)
     mass = line.spread(edges, rng.uniform(50, 900, 60))
     rotary = line.spread(edges, rng.uniform(0, 50, 60))
-    shapes, rotations = [], []
+    shapes, rotations, slopes = [], [], []
     for values in rng.uniform(-1, 1, (2, edges.size)):
         slope = np.gradient(values, edges)
         shapes.append(line.linear(edges, values))
-        rotations.append(line.linear(edges, slope))
-    shapes, rotations = np.array(shapes), np.array(rotations)
+        rotations.append(0.8 * line.linear(edges, slope))  # the rest is shear strain
+        slopes.append(line.slope(edges, values))
+    shapes, rotations, slopes = np.array(shapes), np.array(rotations), np.array(slopes)
     x = line.points
     rigid = np.array([np.ones_like(x), x])
     turned = np.array([np.zeros_like(x), np.ones_like(x)])
@@ -48,10 +49,11 @@ def vehicle() -> LoadedVehicle:
         c = np.linalg.solve(gram, [line.total(mass * a * shapes[k] + rotary * p * rotations[k]) for a, p in pairs])
         shapes[k] -= c @ rigid
         rotations[k] -= c @ turned
+        slopes[k] -= c @ turned
     force = PRESSURE * construction.reference_area
     air, at_stations = (force * intensity(construction, [1.4], at)[0] for at in (x, STATIONS + JUST_FORWARD))
     tank = np.array([4000.0]), np.array([9.0])
-    return LoadedVehicle(line, mass, rotary, air, at_stations, THRUST, SPEED, shapes, rotations, *tank)
+    return LoadedVehicle(line, mass, rotary, air, at_stations, THRUST, SPEED, shapes, rotations, slopes, *tank)
 
 
 NAMES = ("angle_of_attack", "engine_angle", "bending", "attitude_rate", "bending_displacement", "bending_rate")
@@ -87,7 +89,7 @@ def test_shears_are_those_of_particles_from_either_side(vehicle, side):
     answer = vehicle.slosh_mass[0] * (found.first_moment / mass + arm * found.second_moment / inertia)
     cases += [(found.engine_angle, *of_point[0]), (found.slosh[0] + answer, *of_point[1])]
     for k in range(2):
-        cases.append((found.bending_displacement[k], air * vehicle.rotation[k], zero))
+        cases.append((found.bending_displacement[k], air * vehicle.slope[k], zero))
         net = -vehicle.mass * weights * vehicle.displacement[k]
         expected = [side * net[(x - s) * side > 0].sum() for s in STATIONS]
         np.testing.assert_allclose(found.bending[k], expected, atol=1e-10 * np.abs(expected).max())
@@ -110,7 +112,7 @@ def refined(vehicle: LoadedVehicle, stations: np.ndarray) -> LoadedVehicle:
     def at(values):
         return values[..., 2 * cell] * (1 - share) + values[..., 2 * cell + 1] * share
 
-    names = ("mass", "rotary_inertia", "normal_force", "displacement", "rotation")
+    names = ("mass", "rotary_inertia", "normal_force", "displacement", "rotation", "slope")
     return replace(vehicle, line=line, **{name: at(getattr(vehicle, name)) for name in names})
 
 
@@ -148,7 +150,7 @@ def test_shear_is_the_derivative_of_the_moment_but_for_rotary_inertia(vehicle):
             share = (x - points[2 * cell]) / (points[2 * cell + 1] - points[2 * cell])
             couples = -rotary * (left * (1 - share) + right * share)
         elif name.startswith("bending"):
-            density = fine.rotation if name.endswith("displacement") else -fine.displacement / fine.relative_velocity
+            density = fine.slope if name.endswith("displacement") else -fine.displacement / fine.relative_velocity
             couples = -rotary * line.total((line.points - center) * fine.normal_force * density)[:, None] / inertia
         here = V[:, 1::3]
         np.testing.assert_allclose(slope, -here - couples, atol=1e-6 * np.abs(here).max(), err_msg=name)
@@ -183,7 +185,7 @@ def test_uniform_beam_with_a_force_at_its_end_has_the_closed_form():
     line = Line.cut_at(stations)
     ones = np.ones_like(line.points)
     none = np.zeros((0, line.points.size))
-    beam = LoadedVehicle(line, per_metre * ones, 0 * ones, 0 * ones, 0 * stations, THRUST, SPEED, none, none,
+    beam = LoadedVehicle(line, per_metre * ones, 0 * ones, 0 * ones, 0 * stations, THRUST, SPEED, none, none, none,
                          np.zeros(0), np.zeros(0))  # fmt: skip
     z = stations / length
     shear = -THRUST * (1 - z) * (1 - 3 * z)
@@ -326,7 +328,7 @@ def test_local_angle_of_attack_terms_are_loads_of_their_forces(vehicle):
     center = (x * masses).sum() / masses.sum()
     cases = [(c.attitude_rate, -(x - center) / SPEED)]
     for k in range(2):
-        cases.append((c.bending_displacement[k], vehicle.rotation[k]))
+        cases.append((c.bending_displacement[k], vehicle.slope[k]))
         cases.append((c.bending_rate[k], -vehicle.displacement[k] / SPEED))
     for found, angle in cases:
         force = vehicle.normal_force * weights * angle
