@@ -31,7 +31,7 @@ def study(
 
     plan = read_plan(file)
     folder = out or Path(f"{file.stem}-results")
-    loaded = load_study(plan.named_vehicle(), changes)
+    loaded = load_study(plan.named_vehicle(), changes, () if plan.times else ("default_times",))
     started = False
     try:
         with steps("members") as bar:
