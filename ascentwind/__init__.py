@@ -17,6 +17,7 @@ __getattr__, __dir__, __all__ = _lazy.attach(
         "model.wind.soundings.read": ["read_profiles", "read_soundings"],
         "runners.construct.build_vehicle": ["build_vehicle"],
         "runners.design.design": ["design"],
+        "runners.figures.plot": ["plot"],
         "runners.flight_load.limit_table": ["Limits"],
         "runners.flight_load.load": ["FlightLoad"],
         "runners.gusts.shapes": ["OneMinusCosine", "QuasiSquare", "RampAndHold"],

@@ -7,6 +7,7 @@ from .model.wind.soundings.read import read_profiles as read_profiles
 from .model.wind.soundings.read import read_soundings as read_soundings
 from .runners.construct.build_vehicle import build_vehicle as build_vehicle
 from .runners.design.design import design as design
+from .runners.figures.plot import plot as plot
 from .runners.flight_load.limit_table import Limits as Limits
 from .runners.flight_load.load import FlightLoad as FlightLoad
 from .runners.gusts.shapes import OneMinusCosine as OneMinusCosine

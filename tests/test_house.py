@@ -24,7 +24,7 @@ FLOORS = (
     ("runners.measured_winds",),
     ("runners.study",),
     ("runners.design", "runners.parameter_study", "runners.views"),
-    ("runners.report",),
+    ("runners.report", "runners.figures"),
     ("runners.reproduction",),
     ("runners.cli",),
 )

@@ -6,10 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
 from rich.table import Table
 
-from ..present.terminal import console, print_table
+from ..present.terminal import Terminal, console, print_table
 from .job import Job, load_study, steps
 from .terminal import Changes, Turbulence, VehicleArgument, results_folder, whole
 
@@ -88,7 +87,7 @@ def _print_agreement(found) -> None:
                     f"{std:.4g}", f"{low:.4g} to {high:.4g}", "yes" if found.inside[k, r, s] else "no",
                     end_section=s + 1 == reference["source"].size,
                 )  # fmt: skip
-    Console(file=console.file, width=max(console.width, WIDE), emoji=False, markup=False).print(table)
+    Terminal(file=console.file, width=max(console.width, WIDE), emoji=False, markup=False).print(table)
 
 
 def _print_resultants(found: ResultantAgreement) -> None:
@@ -114,7 +113,7 @@ def _print_resultants(found: ResultantAgreement) -> None:
                 str(found.passed[k, r]), f"{low} to {high}", "yes" if found.inside[k, r] else "no",
                 end_section=r + 1 == len(found.resultants),
             )  # fmt: skip
-    Console(file=console.file, width=max(console.width, WIDE), emoji=False, markup=False).print(table)
+    Terminal(file=console.file, width=max(console.width, WIDE), emoji=False, markup=False).print(table)
 
 
 def tolerance(

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from ..gusts.search import GustSweep
 
 SHAPES = ("one-minus-cosine", "quasi-square")
-AROUND, POINTS = (0.5, 4.0), 181  # s before a worst gust is met and after its largest response, and times drawn
 
 
 def gust(
@@ -74,7 +73,7 @@ def gust(
     job.written += write_gusts(sweeps, sheets, job.folder)
     with console.status("figures"):
         for name in (n for n in sweeps[0].responses if any(sweep.worst(n).value for sweep in sweeps)):
-            over_time = [response_over_time(sweep, name) for sweep in sweeps]
+            over_time = [sweep.over_time(name) for sweep in sweeps]
             job.written += write_figure(gust_figure(sweeps, over_time, name, known.title), job.folder, f"gust_{name}")
         for load in (name for name in known_loads(known) if name in sweeps[0].responses):
             worst = [sweep.worst(load) for sweep in sweeps]
@@ -87,18 +86,6 @@ def gust(
             )
     print_gusts(sweeps, sheets)
     job.end()
-
-
-def response_over_time(sweep: GustSweep, name: str) -> xr.Dataset:
-    """Return the response to the worst gust of a sweep, from before it is met on."""
-    import numpy as np
-
-    worst, case = sweep.worst(name), sweep.case
-    low = max(case.system.start, worst.time_met - AROUND[0])
-    ends = np.linspace(low, min(case.system.end, worst.time + AROUND[1]), POINTS)
-    from ..gusts.response import gust_response
-
-    return gust_response(case, worst.gust, worst.start_altitude, ends, [name])
 
 
 def print_gusts(sweeps: list[GustSweep], sheets: list[xr.Dataset]) -> None:

@@ -7,9 +7,8 @@ from collections.abc import Callable
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
-from ..present.style import STYLE, display, words
+from ..present.style import STYLE, Figure, display, words
 from .vehicle_numbers import VehicleNumbers
 
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from matplotlib import rc_context
-from matplotlib.figure import Figure
 
-from ..present.style import SHADES, STYLE, display, words
+from ..present.style import SHADES, STYLE, Figure, display, words
 from ..statistics.resultants import labels_of, outputs_of
 from .design import TradePoint
 

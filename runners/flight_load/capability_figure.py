@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib import rc_context
-from matplotlib.figure import Figure
 
-from ..present.style import COLORS, STYLE, display, words, wrapped
+from ..present.style import COLORS, STYLE, Figure, display, words, wrapped
 from .passage import Passage
 
 

@@ -7,9 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 from matplotlib import rc_context
-from matplotlib.figure import Figure
 
-from ..present.style import COLORS, SHADES, STYLE, display, words, wrapped
+from ..present.style import COLORS, SHADES, STYLE, Figure, display, words, wrapped
 from .search import GustSweep, WorstGust
 
 

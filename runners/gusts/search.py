@@ -10,14 +10,14 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ...model.errors import ParameterValueError
+from ...model.errors import ParameterValueError, UnknownNameError
 from ..case.case import Case
 from ..case.climb import Climb
 from ..case.provenance import provenance
 from ..case.times import end_times, parse_times, spread_over
 from ..present.netcdf import RULE
 from ..present.notebook import html_of
-from .response import check_on_flight, checked_responses, described, gust_products
+from .response import check_on_flight, checked_responses, described, gust_products, gust_response
 from .shapes import LENGTHS, Gust, GustError
 from .weights import WindWeights, wind_weights
 
@@ -29,6 +29,7 @@ PERIODS = 8  # starts in a period of the fastest oscillation
 MOST_STARTS = 2000
 ZOOMS, ZOOM, FINER = 5, 9, 4  # halves of a grid of 9 x 9 points about the worst, each time 4 times finer
 TIME_ZOOMS, TIME_POINTS = 2, 9
+AROUND, POINTS = (0.5, 4.0), 181  # s before a worst gust is met and after its largest response, and times drawn
 
 
 @dataclass(frozen=True)
@@ -134,7 +135,8 @@ class GustSweep:
         ------
         UnknownNameError, IntegrationError
         """
-        self.case.system.output_index(response)
+        if response not in self.responses:
+            raise UnknownNameError("response", response, self.responses)
         return self._worst[response]
 
     @cached_property
@@ -215,6 +217,27 @@ class GustSweep:
         unit = self.units[self.responses.index(name)]
         start = float(self.climb.altitude(met))
         return WorstGust(name, unit, value, weights.time, replace(self.gust, length=length), start, met)
+
+    def over_time(self, response: str) -> xr.Dataset:
+        """Return a response to its worst gust, from before that is met on.
+
+        Parameters
+        ----------
+        response : str
+
+        Returns
+        -------
+        Dataset
+            As :meth:`Study.gust_response` returns it.
+
+        Raises
+        ------
+        UnknownNameError
+        """
+        worst = self.worst(response)
+        low = max(self.case.system.start, worst.time_met - AROUND[0])
+        ends = np.linspace(low, min(self.case.system.end, worst.time + AROUND[1]), POINTS)
+        return gust_response(self.case, worst.gust, worst.start_altitude, ends, [response])
 
     def __repr__(self) -> str:
         lines = [

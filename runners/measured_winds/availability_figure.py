@@ -6,10 +6,9 @@ import numpy as np
 import xarray as xr
 from matplotlib import colormaps, rc_context
 from matplotlib.colors import LogNorm
-from matplotlib.figure import Figure
 from matplotlib.projections.polar import PolarAxes
 
-from ..present.style import STYLE, display, words, wrapped
+from ..present.style import STYLE, Figure, display, words, wrapped
 
 LEAST = 1e-6
 

@@ -47,6 +47,7 @@ from .limited_loads import LimitedLoads, Row, limited_loads, row_weights, symmet
 from .met_winds import MetWinds, met_winds
 from .other_winds import in_mean_winds
 from .persistence import ComponentPersistence, Persistence
+from .profile_statistics import number_of
 from .random_wind import FARTHEST
 from .wind_field import Lasting, WindField, default_persistence, wind_field
 
@@ -518,7 +519,7 @@ class DayOfLaunch:
         ----------
         response : str
         """
-        return self.flight.loads.rows[self.responses.index(response)].unit
+        return self.flight.loads.rows[number_of(response, self.responses)].unit
 
     def _passage(self, given: bool) -> Passage:
         """Return the passage given the measurements, or of the season, on the fine grid where it is worth while."""

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib import rc_context
-from matplotlib.figure import Figure
 
-from ..present.style import COLORS, SHADES, STYLE, display, words, wrapped
+from ..present.style import COLORS, SHADES, STYLE, Figure, display, words, wrapped
 from .flown_resultants import FlownResultants
 from .fly import FlownWinds
+from .profile_statistics import number_of
 
 MOST = 400  # histories drawn
 BAND = 0.99
@@ -28,7 +28,7 @@ def flown_figure(flown: FlownWinds | FlownResultants, response: str, title: str)
     -------
     matplotlib.figure.Figure
     """
-    r = flown.responses.index(response)
+    r = number_of(response, flown.responses)
     values, times = flown.values[:, :, r], flown.times
     factor, unit = display(flown.unit(response), values)
     tail = 0.5 * (1 - BAND)

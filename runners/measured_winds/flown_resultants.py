@@ -16,7 +16,7 @@ from ..present.netcdf import RULE
 from ..present.notebook import html_of
 from ..solvers.discretisation import symmetric_root
 from ..statistics.norm import NormOfNormal
-from .profile_statistics import independent_profiles, percentile_dataset, worst_profiles
+from .profile_statistics import independent_profiles, number_of, percentile_dataset, worst_profiles
 from .profiles import CompleteProfiles
 
 PERCENTILES = (0.05, 0.5, 0.95, 0.99)
@@ -73,7 +73,7 @@ class FlownResultants:
         ----------
         resultant : str
         """
-        return self.units[self.responses.index(resultant)]
+        return self.units[number_of(resultant, self.responses)]
 
     def _norms(self, histories: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.stack([np.hypot(histories[..., a], histories[..., b]) for a, b in self.pairs.values()], axis=-1)
@@ -161,7 +161,7 @@ class FlownResultants:
         -------
         list of tuples
         """
-        values = self.values[:, :, self.responses.index(resultant)]
+        values = self.values[:, :, number_of(resultant, self.responses)]
         return worst_profiles(values, self.profiles, self.times, count)
 
     def to_dataset(self) -> xr.Dataset:

@@ -29,7 +29,7 @@ from ..statistics.resultants import resultant_pairs
 from .flown_resultants import FlownResultants
 from .level_weights import LevelWeights, level_weights
 from .met_winds import met_winds
-from .profile_statistics import independent_profiles, percentile_dataset, worst_profiles
+from .profile_statistics import independent_profiles, number_of, percentile_dataset, worst_profiles
 from .profiles import CompleteProfiles, complete_profiles, soundings_of
 from .random_wind import random_wind
 
@@ -222,7 +222,7 @@ class FlownWinds:
         -------
         list of tuples
         """
-        values = self.values[:, :, self.responses.index(response)]
+        values = self.values[:, :, number_of(response, self.responses)]
         return worst_profiles(values, self.profiles, self.weights.times, count)
 
     def normality(self, response: str) -> Normality | None:
@@ -236,7 +236,7 @@ class FlownWinds:
         -------
         Normality or None
         """
-        r = self.responses.index(response)
+        r = number_of(response, self.responses)
         least = float(self.independent[:, r].min())
         if least < FEWEST or not (self.values[:, :, r].std(axis=0) > 0).all() or not self.predicted_std[:, r].all():
             return None

@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from ..flight_load.passage import LimitedLoad
-from ..present.style import COLORS, SHADES, STYLE, display, words, wrapped
+from ..present.style import COLORS, SHADES, STYLE, Figure, display, words, wrapped
 from .day_of_launch import BAND, DayOfLaunch
 from .limited_loads import Limit
 from .persistence import EXPONENTS

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
+from ...model.errors import UnknownNameError
 from ...model.wind.soundings.collection import independent_samples
 from ..present.netcdf import RULE
 from .profiles import CompleteProfiles
@@ -87,6 +88,18 @@ def percentile_dataset(
         {name: (over, values, {RULE: "response", "long_name": text}) for name, (over, values, text) in parts.items()},
         {"probability": probabilities, "bound": ["lower", "upper"]} | dict(coordinates),
     )
+
+
+def number_of(response: str, known: Sequence[str]) -> int:
+    """Return which of those flown a response is.
+
+    Raises
+    ------
+    UnknownNameError
+    """
+    if response not in known:
+        raise UnknownNameError("response", response, known)
+    return known.index(response)
 
 
 def worst_profiles(

@@ -7,11 +7,10 @@ from textwrap import wrap
 import numpy as np
 import xarray as xr
 from matplotlib import rc_context
-from matplotlib.figure import Figure
 from scipy import stats
 
 from ...model.system.names import COMBINED
-from ..present.style import COLORS, STYLE, wrapped
+from ..present.style import COLORS, STYLE, Figure, wrapped
 from .compute import COMPUTED, STATUS
 from .measures import PEAK, displayed, loads, timed
 from .measures import label as label_of

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 from matplotlib import rc_context
-from matplotlib.figure import Figure
 
 from ...model.system.names import COMBINED
-from ..present.style import COLORS, STYLE, wrapped
+from ..present.style import COLORS, STYLE, Figure, wrapped
 from .compute import COMPUTED, FAILED, STATUS, UNSTABLE
 from .measures import PEAK, displayed
 from .measures import label as label_of

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from io import BytesIO
 from pathlib import Path
 from textwrap import wrap
 from typing import Any
 
 import numpy as np
+from matplotlib import figure as matplotlib_figure
 from matplotlib import rc_context
 from matplotlib.axis import Axis, Tick
-from matplotlib.figure import Figure
 from matplotlib.text import Text
 from matplotlib.ticker import FixedFormatter, FuncFormatter
 from numpy.typing import ArrayLike
@@ -27,6 +28,7 @@ DISPLAY = {
 }
 NEWTONS = ("N", "N m", "N m/rad")
 PREFIXES = ((1e6, "M"), (1e3, "k"), (1.0, ""))  # of newtons: the first that leaves the largest value at 1 or more
+BRITISH = {"center": "centre", "generalized": "generalised"}  # names are American, prose is not
 TITLE_WIDTH = 76  # characters across a figure of 8 inches
 STYLE: dict[Any, Any] = {
     "figure.figsize": (8.0, 5.0),
@@ -41,6 +43,17 @@ STYLE: dict[Any, Any] = {
 }
 COLORS = {"mean": "#444444", "wind": "#1f6fb4", COMBINED: "#c8442c"}
 SHADES = ("#1f6fb4", "#c8442c", "#3a8f4d", "#8e5bb5", "#c98a1b", "#444444")  # of curves that stand for no source
+
+
+class Figure(matplotlib_figure.Figure):
+    """A figure that shows itself in a notebook, where those of matplotlib need pyplot for it."""
+
+    def _repr_png_(self) -> bytes:
+        _take_dollars_as_written(self)
+        image = BytesIO()
+        with rc_context(STYLE):
+            self.savefig(image, format="png")
+        return image.getvalue()
 
 
 def display(unit: str, values: ArrayLike) -> tuple[float, str]:
@@ -64,11 +77,14 @@ def _parts(line: str) -> list[str]:
 
 
 def words(name: str) -> str:
-    """Return a name as words: 'bending_moment' becomes 'bending moment'."""
-    return name.replace("_", " ")
+    """Return a name as words of prose, which is British: 'center_of_pressure' becomes 'centre of pressure'."""
+    found = name.replace("_", " ")
+    for american, british in BRITISH.items():
+        found = found.replace(american, british)
+    return found
 
 
-def write_figure(figure: Figure, folder: Path, name: str) -> list[Path]:
+def write_figure(figure: matplotlib_figure.Figure, folder: Path, name: str) -> list[Path]:
     """Write a figure as PNG and SVG; a dollar sign in a title or name stays one."""
     name = file_name(name)
     _take_dollars_as_written(figure)
@@ -81,7 +97,7 @@ def write_figure(figure: Figure, folder: Path, name: str) -> list[Path]:
         ]
 
 
-def _take_dollars_as_written(figure: Figure) -> None:
+def _take_dollars_as_written(figure: matplotlib_figure.Figure) -> None:
     """Keep titles and names from being read as mathematics, which only the powers of ten on axes are."""
     axes = [axis for axis in figure.findobj(Axis) if isinstance(axis, Axis)]
     numbers = set()  # tick labels, and what stands beside them

@@ -10,14 +10,32 @@ from typing import Any
 
 from rich.console import Console
 from rich.measure import Measurement
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    SpinnerColumn,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 from rich.table import Table
 
+
+class Terminal(Console):
+    """A console that moves nothing where no terminal is, though FORCE_COLOR asks for colour, as in notebooks."""
+
+    @property
+    def is_terminal(self) -> bool:
+        """Whether what is printed reaches a terminal."""
+        return super().is_terminal and (self.is_jupyter or self.file.isatty())
+
+
 # '40:100:5' is no emoji, and a folder called '[/red]' no markup
-console = Console(emoji=False, markup=False)
+console = Terminal(emoji=False, markup=False)
 
 
-errors = Console(stderr=True, emoji=False, markup=False)
+errors = Terminal(stderr=True, emoji=False, markup=False)
 
 
 warned: list[str] = []  # warnings that the command under way has printed
@@ -35,13 +53,15 @@ def complain(text: str) -> None:
 
 
 def progress_bar() -> Progress:
-    """Return a bar that says what is done, how much of it, and for how long."""
+    """Return a bar that says what is done, how much of it, for how long, and how long it will still take."""
     return Progress(
         SpinnerColumn(),
         TextColumn("{task.description}"),
         BarColumn(),
         MofNCompleteColumn(),
         TimeElapsedColumn(),
+        TextColumn("left", style="dim"),
+        TimeRemainingColumn(),
         console=console,
         transient=True,
     )
@@ -144,8 +164,8 @@ def print_table(table: Table, console: Console) -> None:
 
 
 def _wide() -> Console:
-    return Console(width=WIDEST, emoji=False, markup=False)
+    return Terminal(width=WIDEST, emoji=False, markup=False)
 
 
 def _print_at_least(width: int, table: Table, console: Console) -> None:
-    Console(file=console.file, width=max(console.width, width), emoji=False, markup=False).print(table)
+    Terminal(file=console.file, width=max(console.width, width), emoji=False, markup=False).print(table)

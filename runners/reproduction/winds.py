@@ -7,10 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from matplotlib import rc_context
-from matplotlib.figure import Figure
 
 from ...model.wind.range_reference import shipped_statistics
-from ..present.style import STYLE, display
+from ..present.style import STYLE, Figure, display
 from ..statistics.larger_side import SIGMAS, side, sign
 from ..statistics.results import ResponseStatistics
 from ..study import Study

@@ -6,10 +6,9 @@ import numpy as np
 import xarray as xr
 from matplotlib import rc_context
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from ...model.system.names import COMBINED
-from ..present.style import COLORS, SHADES, STYLE, display, words
+from ..present.style import COLORS, SHADES, STYLE, Figure, display, words
 from ..statistics.larger_side import LABEL, LARGER_SIDE, side
 
 BARS = 14

@@ -7,10 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 from matplotlib import rc_context
-from matplotlib.figure import Figure
 
 from ...model.system.names import COMBINED
-from ..present.style import COLORS, STYLE, display, words, wrapped
+from ..present.style import COLORS, STYLE, Figure, display, words, wrapped
 from .larger_side import LABEL, SIGMAS, side, sign
 from .peaks import peaks
 

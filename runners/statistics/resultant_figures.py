@@ -8,12 +8,11 @@ from typing import Any
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from ...model.system.names import COMBINED
 from ...model.vehicle.planes import PLANES
-from ..present.style import COLORS, SHADES, STYLE, display, words, wrapped
+from ..present.style import COLORS, SHADES, STYLE, Figure, display, words, wrapped
 from .larger_side import SIGMAS
 from .norm import NormOfNormal
 from .resultants import ResultantPeak, Resultants

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from matplotlib import rc_context
-from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
-from ..present.style import STYLE
+from ..present.style import STYLE, Figure
 from .tolerance import Measurement, Pace
 
 

@@ -12,7 +12,6 @@ import numpy as np
 import xarray as xr
 from matplotlib import rc_context
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from ...model.construction.construction_file import CONSTRUCTION_FILE, load_construction
 from ...model.construction.tank_shape import TankShape
@@ -22,7 +21,7 @@ from ...model.system.names import COMBINED
 from ...model.vehicle.vehicle import Vehicle
 from ..present.files import write_text
 from ..present.netcdf import write_netcdf
-from ..present.style import COLORS, STYLE, display, words, write_figure
+from ..present.style import COLORS, STYLE, Figure, display, words, write_figure
 from ..station_loads.loads_along_vehicle import LOADS, every_load_along_vehicle, known_loads
 from ..statistics.larger_side import LABEL, larger_side, side
 

@@ -7,12 +7,11 @@ from collections.abc import Iterable
 
 import xarray as xr
 from matplotlib import rc_context
-from matplotlib.figure import Figure
 
 from ...model.errors import ParameterValueError, PlanesError
 from ..case.case import Case
 from ..case.provenance import provenance
-from ..present.style import COLORS, STYLE, display, words, wrapped
+from ..present.style import COLORS, STYLE, Figure, display, words, wrapped
 from ..statistics.engines import response_statistics
 from ..statistics.norm import LIKE_3_SIGMA
 

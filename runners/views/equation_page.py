@@ -14,11 +14,15 @@ Equations 4-1 to 4-13 of the report as the model reads them (`docs/equations.md`
 each by every table and parameter in it; of modes and tanks the first stands for the others. CasADi differentiates,
 SymPy prints:
 
-    ascentwind equations {vehicle} --page docs/derivatives.md
+```sh
+ascentwind equations {vehicle} --page docs/derivatives.md
+```
 
 writes this page, and a test fails when it is stale.
 
-    ascentwind equations {vehicle} --of angle_of_attack --by relative_velocity
+```sh
+ascentwind equations {vehicle} --of angle_of_attack --by relative_velocity
+```
 
 prints any other derivative, also of the assembled system's outputs and rates.
 

@@ -7,12 +7,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib import rc_context
-from matplotlib.figure import Figure
 
 from ...model.vehicle.planes import require_yaw
 from ..case.case import Case
 from ..case.provenance import provenance
-from ..present.style import STYLE, words
+from ..present.style import STYLE, Figure, words
 from ..solvers.planar_mean import RESPONSES, planar_mean
 
 MODELS = ("linear", "linear_rigid", "nonlinear_rigid")

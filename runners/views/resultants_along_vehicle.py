@@ -8,13 +8,12 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 from matplotlib import rc_context
-from matplotlib.figure import Figure
 
 from ...model.system.names import COMBINED
 from ...model.vehicle.loads import BENDING_MOMENT, SHEAR_FORCE
 from ..case.case import Case
 from ..present.files import write_text
-from ..present.style import COLORS, SHADES, STYLE, display, words, wrapped, write_figure
+from ..present.style import COLORS, SHADES, STYLE, Figure, display, words, wrapped, write_figure
 from ..station_loads.loads_along_vehicle import known_loads, resultant_along_vehicle
 from ..statistics.larger_side import SIGMAS
 

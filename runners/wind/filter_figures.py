@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib import rc_context
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from ...model.wind.shaping_filter import ShapingFilter
 from ...model.wind.statistics import WindStatistics, report_standard_deviation
-from ..present.style import STYLE
+from ..present.style import STYLE, Figure
 from .fitting.intervals import covariance_interval
 from .synthesis.result import SynthesisResult
 

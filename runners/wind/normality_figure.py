@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib import rc_context
-from matplotlib.figure import Figure
 
 from ...model.wind.soundings.collection import Soundings, independent_samples
 from ...model.wind.soundings.normality import quantile_band
-from ..present.style import COLORS, SHADES, STYLE, wrapped
+from ..present.style import COLORS, SHADES, STYLE, Figure, wrapped
 
 LEVELS = 6  # shown
 

@@ -92,7 +92,7 @@ def test_singular_coupling_names_the_time(vehicle_folder):
     path = vehicle_folder / "bending_1.csv"
     lines = [line.split(",") for line in path.read_text().splitlines()]
     for cells in lines[3:]:
-        cells[2] = "500"  # generalized mass, kg, below what the slosh masses weigh in the mode
+        cells[2] = "500"  # generalised mass, kg, below what the slosh masses weigh in the mode
     path.write_text("\n".join(",".join(cells) for cells in lines) + "\n")
     with pytest.raises(SingularCouplingError, match="at 10 s the mass matrix of bending and slosh is singular"):
         Study.load(vehicle_folder, compile=False)
