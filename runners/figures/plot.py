@@ -106,7 +106,7 @@ def _responses(result: Any) -> Sequence[str]:
     if isinstance(result, Resultants):
         return [str(name) for name in result.dataset["resultant"].values]
     if isinstance(result, ParameterStudy):
-        return [str(name) for name in result.data["response"].values]
+        return [str(name) for name in measures(result)["response"].values]
     return result.responses
 
 
