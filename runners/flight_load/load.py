@@ -33,7 +33,7 @@ from .pathwise import Movement, Reaching, movement, reaching
 from .probability import Estimate, Level, estimate, find_level
 from .process import ManyOutputs
 from .request import SpacingWarning, checked_draws, checked_level, refuse_without_variance
-from .response import HALVINGS, STEPS, ResponseInWindow, squared_diffusion
+from .response import HALVINGS, MOST_STEPS, STEPS, ResponseInWindow, squared_diffusion
 from .sampling import draw_beyond, instant_levels, sighted_steps, steps_near
 from .sensitivity import level_sensitivity
 from .uncertain_parameter import checked_spread, processes_of, uncertain_level
@@ -42,7 +42,6 @@ from .wind_interval import wind_interval_of
 from .window import checked_window
 
 DESIGN = 0.00135  # 1 - Phi(3): with this chance an instant passes mean + 3 sigma
-MOST_STEPS = 9600
 SPACING_ERROR = 0.02  # relative, of a probability; finer where it is larger
 FREEDOM = 0.03  # of a variance
 DRAWS = 2000
@@ -97,17 +96,24 @@ class FlightLoad:
     @cached_property
     def process(self) -> Process:
         """The response as a Gaussian process over the window, or the norm of two."""
-        return self.of.process()
+        return replace(self.of, steps=min(self.of.steps, MOST_STEPS)).process()
 
     @cached_property
     def parts(self) -> tuple[ResponseInWindow, ...]:
-        """Where flights pass the level of each probability: of a resultant a part of the window."""
-        return tuple(self.of.near(p) for p in self.probabilities)
+        """Where flights pass the level of each probability, which is mostly a part of the window."""
+        return tuple(self.of.near(p, self.sides) for p in self.probabilities)
 
     @cached_property
     def processes(self) -> tuple[Process, ...]:
         """The response as a process there, one a probability."""
-        return tuple(part.process() if part.is_resultant else self.process for part in self.parts)
+        made = {(part.window, part.steps): part for part in self.parts}
+        processes = {place: part.process() for place, part in made.items()}
+        return tuple(processes[part.window, part.steps] for part in self.parts)
+
+    def _process_for(self, value: float) -> Process:
+        """Return the response over the smallest part of the window outside which a level is not passed."""
+        lower = [k for k, level in enumerate(self.levels) if level.value <= value]
+        return self.processes[max(lower, key=lambda k: self.levels[k].value)] if lower else self.process
 
     def _boundary(self, value: float) -> Boundary:
         return Boundary.constant(value, self.process.seen, self.sides)
@@ -336,8 +342,10 @@ class FlightLoad:
         ParameterValueError
             The value is no finite number.
         """
-        boundary = self._boundary(checked_level(value))
-        return estimate(draw_beyond(self.process, boundary, self._random(1), self.draws), boundary)
+        level = checked_level(value)
+        process = self._process_for(level)
+        boundary = Boundary.constant(level, process.seen, self.sides)
+        return estimate(draw_beyond(process, boundary, self._random(1), self.draws), boundary)
 
     def upcrossing_rate(self, level: float) -> xr.DataArray:
         """Return Rice's rate at which a level is passed outward, (time,), of a response that is differentiable.
@@ -405,9 +413,11 @@ class FlightLoad:
         values, found, errors = np.linspace(begin, end, 36), [], []
         count = self.draws // (2 if self.of.is_resultant else 4)  # those of circles weigh less alike
         for number, group in enumerate(np.split(values, 12)):
-            draws = draw_beyond(self.process, self._boundary(group[0]), self._random(2, number), count)
-            for value in group:
-                each = draws.contributions(self._boundary(value))
+            process = self._process_for(group[0])
+            boundaries = [Boundary.constant(value, process.seen, self.sides) for value in group]
+            draws = draw_beyond(process, boundaries[0], self._random(2, number), count)
+            for boundary in boundaries:
+                each = draws.contributions(boundary)
                 found.append(min(float(each.mean()), 1.0))
                 errors.append(float(each.std(ddof=1) / np.sqrt(each.size)))
         level = ("level", values, {"units": self.unit, "long_name": "level"})
@@ -529,8 +539,8 @@ class FlightLoad:
         for number in range(count):
             others = [k for k in range(count) if k != number]
             levels = []
-            for part, p in zip(self.parts, self.probabilities, strict=True):
-                process = part.process(others)
+            for p in self.probabilities:
+                process = self.of.near(p, self.sides, others).process(others)
                 varies = float(process.std.max()) > 0
                 still = float(SIZES[self.sides](process.seen.mean).max())
                 levels.append(self._level(process, p, self.draws // 4).value if varies else still)
@@ -624,7 +634,7 @@ def flight_load(
         raise ParameterValueError(f"'{name}' is a resultant, which has no {sided} side; ask with sides='both'")
     load = FlightLoad(asked_of, asked, sided, draws, seed, limits)
     refuse_without_variance(name, load.processes[0])
-    while load.is_coarse and load.of.steps < MOST_STEPS:
+    while load.is_coarse and max(part.steps for part in load.parts) < MOST_STEPS:
         load = replace(load, of=replace(load.of, steps=2 * load.of.steps))
     if load.is_coarse:
         warnings.warn(SpacingWarning(_coarse_in_words(load)), stacklevel=3)
@@ -632,16 +642,18 @@ def flight_load(
 
 
 def _coarse_in_words(load: FlightLoad) -> str:
-    step, reasons = (load.window[1] - load.window[0]) / load.of.steps, []
+    part, reasons = max(load.parts, key=lambda part: part.steps), []
     if load.spacing_missed > SPACING_ERROR:
         reasons.append(f"it misses about {100 * load.spacing_missed:.2g} % of it")
     if load.is_fast:
+        step = (part.window[1] - part.window[0]) / part.steps
         error = max(level.probability.standard_error / level.probability.value for level in load.levels)
         reasons.append(
             f"'{load.response}' swings within steps of {2**HALVINGS * step:.2g} s, so that it may be too large, and is "
             f"known to {100 * error:.2g} % only"
         )
     return (
-        f"the grid of {load.of.steps} steps is coarse for the probability that '{load.response}' passes its level: "
+        f"the grid of {part.steps} steps from {part.window[0]:.4g} to {part.window[1]:.4g} s is coarse for the "
+        f"probability that '{load.response}' passes its level: "
         f"{', and '.join(reasons)}; ask for a shorter window"
     )

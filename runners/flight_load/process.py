@@ -19,6 +19,7 @@ from ..solvers.markov_chain import MarkovChain
 
 NEIGHBOURS = 8  # old points that a new one between them is drawn from
 SEVERAL = 5.0  # standard deviations that a path may go between two points
+BLOCK = 64  # times that a covariance between all times is made of at once
 JITTER = (1e-14, 1e-13, 1e-12, 1e-11, 1e-10, 1e-9)  # of a variance; what a factor of a smooth process needs
 
 
@@ -309,18 +310,39 @@ def _joint_covariance(
     rows, P = row[::stride], P[::stride]
     m, r, n = rows.shape
     found = np.zeros((m * r, m * r))
-    columns = np.zeros((n, m * r))  # Phi(t_k, t_j) P(t_j) C(t_j)' for all j up to k
-    for k in range(m):
-        now, before = slice(k * r, (k + 1) * r), slice(0, k * r)
-        if k:
-            Phi = chain.transition[(k - 1) * stride]
-            for further in chain.transition[(k - 1) * stride + 1 : k * stride]:
-                Phi = further @ Phi
-            columns[:, before] = Phi @ columns[:, before]
-        columns[:, now] = P[k] @ rows[k].T
-        found[now, : (k + 1) * r] = rows[k] @ columns[:, : (k + 1) * r]
-        found[: (k + 1) * r, now] = found[now, : (k + 1) * r].T
+    columns = np.zeros((n, m * r))  # Phi(t_first, t_j) P(t_j) C(t_j)' for all j before a block's first time
+    for first in range(0, m, BLOCK):
+        count = min(BLOCK, m - first)
+        steps = [_transition(chain, first + k, stride) for k in range(count) if first + k < m - 1]
+        own = np.zeros((n, count * r))  # the same of the block's own j, up to t_k
+        onward = np.eye(n)  # Phi(t_k, t_first)
+        seen = np.empty((count * r, n))
+        for k in range(count):
+            if k:
+                own[:, : k * r] = steps[k - 1] @ own[:, : k * r]
+                onward = steps[k - 1] @ onward
+            now = slice(k * r, (k + 1) * r)
+            own[:, now] = P[first + k] @ rows[first + k].T
+            seen[now] = rows[first + k] @ onward
+            at = slice((first + k) * r, (first + k + 1) * r)
+            inside = slice(first * r, at.stop)
+            found[at, inside] = rows[first + k] @ own[:, : (k + 1) * r]
+            found[inside, at] = found[at, inside].T
+        block, before = slice(first * r, (first + count) * r), slice(0, first * r)
+        found[block, before] = seen @ columns[:, before]
+        found[before, block] = found[block, before].T
+        if len(steps) == count:
+            columns[:, before] = steps[-1] @ onward @ columns[:, before]
+            columns[:, block] = steps[-1] @ own
     return found.reshape(m, r, m, r)
+
+
+def _transition(chain: MarkovChain, step: int, stride: int) -> NDArray[np.float64]:
+    """Return Phi over so many steps of a chain at once."""
+    Phi = chain.transition[step * stride]
+    for further in chain.transition[step * stride + 1 : (step + 1) * stride]:
+        Phi = further @ Phi
+    return Phi
 
 
 def _root(covariance: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -7,12 +7,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtr
 
 from ...model.errors import ParameterValueError
 from ..case.case import Case
 from ..case.chain import TOLERANCE
 from ..solvers.markov_chain import MarkovChain
 from ..statistics.norm import NormOfNormal
+from ..statistics.percentiles import Sides, instant_level
 from ..statistics.resultants import resultant_pairs
 from .norms import Norms
 from .process import JointOutputs, joint_covariance, joint_outputs
@@ -20,9 +22,12 @@ from .window import window_chain
 
 HALVINGS = 2  # from the grid of which paths are drawn to the one on which they are seen
 STEPS = 2400  # of the window at first; AS-504 in 60 s: 0.025 s
-COARSE = 1.0  # s, between the times at which a resultant is seen where its window is worth drawing
-FINE = 0.025  # s, at most between the points at which it is seen there, at first
-LEFT_OUT = 2e-3  # of the probability, at most, that is passed only where no path is drawn
+MOST_STEPS = 9600  # of a part of it
+FINE = 0.025  # s, at most between the points at which a part is seen, at first
+SCOUTED = 600  # steps of the window between the times at which it is judged where a level is passed
+PARTS = 24  # of a window: what is drawn begins and ends with one, so that responses share the states there
+ROUNDING = 1e-9
+LEFT_OUT = 5e-5  # of the chance of the worst instant, at most, that all instants where no path is drawn have together
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,26 +109,49 @@ class ResponseInWindow:
         """The states at the times at which paths are seen."""
         return window_chain(self.case, self.window, self.steps, TOLERANCE)
 
-    def near(self, probability: float) -> ResponseInWindow:
+    def near(self, probability: float, sides: Sides, sources: Sequence[int] | None = None) -> ResponseInWindow:
         """Return it over the part of the window in which the level passed with a probability is passed at all.
 
-        Of one response all of the window; both planes have twice the states and are looked at where it matters.
+        Parameters
+        ----------
+        probability : float
+            Of passing the level in flight; instants outside the part pass it too rarely to matter.
+        sides : {'both', 'upper', 'lower'}
+        sources : sequence of int, optional
+            Numbers of those that act; all without it.
         """
-        if not self.is_resultant:
-            return self
         begin, end = self.window
-        chain = window_chain(self.case, self.window, max(2, int(np.ceil((end - begin) / COARSE))))
+        chain = window_chain(self.case, self.window, SCOUTED)
         C = chain.output[:, self.rows]
-        law = NormOfNormal(chain.mean[:, self.rows], C @ chain.covariance() @ C.swapaxes(1, 2))
-        if not float(law.covariance.max()) > 0:
+        mean, covariance = chain.mean[:, self.rows], C @ chain.covariance(sources) @ C.swapaxes(1, 2)
+        if not float(covariance.max()) > 0:
             return self
-        beyond = law.exceedance(law.percentile(probability).max())  # flights pass a higher level
-        kept = np.flatnonzero(beyond >= LEFT_OUT * beyond.max() / beyond.size)
-        first, last = max(int(kept[0]) - 1, 0), min(int(kept[-1]) + 1, beyond.size - 1)
-        part = float(chain.times[first]), float(chain.times[last])
+        beyond = self._beyond(mean, covariance, probability, sides)
+        rare = 0.5 * LEFT_OUT * float(beyond.max())
+        first, last = np.searchsorted(np.cumsum(beyond), rare), np.searchsorted(np.cumsum(beyond[::-1]), rare)
+        scouted = SCOUTED // PARTS
+        first, last = max(int(first) - 1, 0) // scouted, PARTS - max(int(last) - 1, 0) // scouted
+        part = tuple(float(time) for time in np.linspace(begin, end, PARTS + 1)[[first, last]])
         spacing = min(end - begin, FINE * STEPS) / self.steps
-        steps = 4 * int(np.ceil((part[1] - part[0]) / spacing / 4))
-        return replace(self, window=part, steps=min(max(steps, 8), self.steps))
+        steps = 4 * int(np.ceil((part[1] - part[0]) / spacing / 4 - ROUNDING))
+        return replace(self, window=(part[0], part[1]), steps=min(steps, self.steps, MOST_STEPS))
+
+    def _beyond(
+        self, mean: NDArray[np.float64], covariance: NDArray[np.float64], probability: float, sides: Sides
+    ) -> NDArray[np.float64]:
+        """Return the chance of each instant (m,) to be beyond the level that the worst one passes with a probability.
+
+        Flights pass a higher level with it.
+        """
+        if self.is_resultant:
+            law = NormOfNormal(mean, covariance)
+            return law.exceedance(law.percentile(probability).max())
+        std = np.sqrt(np.maximum(covariance[:, 0, 0], 0.0))
+        level = instant_level(mean[:, 0], std, probability, sides).max()
+        signed = {"both": (1.0, -1.0), "upper": (1.0,), "lower": (-1.0,)}[sides]
+        away = np.array([sign * mean[:, 0] - level for sign in signed])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.where(std > 0, ndtr(away / std), away >= 0).sum(axis=0)
 
 
 def squared_diffusion(
