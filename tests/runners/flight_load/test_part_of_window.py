@@ -16,7 +16,7 @@ from ascentwind.runners.flight_load.window import window_chain
 
 
 def humps(*spans: tuple[float, float, float], rest: float = 0.01) -> Study:
-    """y = sum f_i(t) x_i, x_i stationary with a standard deviation of one, f_i a size within a span of time, else less."""
+    """y = sum f_i(t) x_i, x_i stationary of unit variance, f_i a size within a span of time, else less."""
     t = ca.SX.sym("t")
     states, noises, y, start = {}, {}, 0, {}
     for k, (begin, end, size) in enumerate(spans):
@@ -25,7 +25,9 @@ def humps(*spans: tuple[float, float, float], rest: float = 0.01) -> Study:
         y += ca.if_else(ca.logic_and(t >= begin, t < end), size, rest) * x
         start[f"n{k}"] = np.diag(np.eye(len(spans))[k])
     return Study.from_system(
-        define_system("humps", time=t, states=states, noises=noises, outputs={"y": y}, start_covariance=start, end=100.0)
+        define_system(
+            "humps", time=t, states=states, noises=noises, outputs={"y": y}, start_covariance=start, end=100.0
+        )
     )
 
 
