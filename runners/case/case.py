@@ -40,6 +40,7 @@ from .mean import LinearMean, NonlinearMean
 from .summary import summary
 from .wind_start import covariance_at
 
+ANGLES = ("azimuth", "roll")  # last word of the names of parameters that turn, in rad
 POSITIVE = ("correlation_time", "reference_area", "standard_deviation", "radius", "length", "high_pass")
 
 
@@ -198,6 +199,11 @@ class Case:
                 raise ParameterValueError(f"parameter '{name}' cannot be {value!r:.40}; give a number") from None
             if not np.isfinite(number) or (name.rpartition(".")[2] in POSITIVE and number <= 0):
                 raise ParameterValueError(f"parameter '{name}' cannot be {number:g}; give a finite, sensible number")
+            if name.rpartition(".")[2] in ANGLES and abs(number) > 2 * np.pi:
+                raise ParameterValueError(
+                    f"parameter '{name}' cannot be {number:g} rad, more than a turn; {number:g} deg is "
+                    f"{np.radians(number):.4g} rad"
+                )
             values[names.index(name)] = number
         return values
 

@@ -9,8 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from ascentwind.model.errors import DataError
+from ascentwind.model.errors import DataError, ParameterValueError
 from ascentwind.model.vehicle.reader import load_vehicle
+from ascentwind.runners import Study
 from ascentwind.runners.cli.app import main
 
 TOML, TABLE = "vehicle.toml", "wind_march_components.csv"
@@ -80,6 +81,22 @@ def section(text: str) -> Callable[[Path], None]:
     return spoil
 
 
+PRODUCT = INERTIA.replace("pitch.tables.moment_of_inertia", "tables.product_of_inertia").replace(
+    "pitch.csv", "product.csv"
+)
+
+
+def product(cell: str) -> Callable[[Path], None]:
+    """Give the vehicle a product of inertia."""
+
+    def spoil(folder: Path) -> None:
+        rows = [f"{t},{cell}" for t in range(1, 151)]
+        (folder / "product.csv").write_text("\n".join(["time [s],product_of_inertia [kg m2]", *rows]) + "\n")
+        section(PRODUCT)(folder)
+
+    return spoil
+
+
 LOADS = '\n[[pitch.loads]]\noutput = "bending_moment"\nstation_m = 25.0\n[pitch.loads.table]\nfile = "short.csv"\n'
 CASES = {
     "azimuth missing": (azimuth("# turns"), "wind.azimuth_deg.*is missing, but planes"),
@@ -104,12 +121,45 @@ CASES = {
         "1.5 is not between -1 and 1",
     ),
     "no start correlation": (replaced(FILTER, '"start_correlation"', '"start_correlatio"'), "start_correlation"),
+    "a negative start correlation beyond one": (
+        lambda folder: (folder / FILTER).write_text(
+            re.sub(r'"start_correlation": [-\d.e]+', '"start_correlation": -1.01', (folder / FILTER).read_text())
+        ),
+        "-1.01 is not between -1 and 1",
+    ),
+    "start correlation not a number": (
+        lambda folder: (folder / FILTER).write_text(
+            re.sub(r'"start_correlation": [-\d.e]+', '"start_correlation": NaN', (folder / FILTER).read_text())
+        ),
+        "start_correlation|not a finite|NaN",
+    ),
     "filter of one component": (replaced(TOML, f'"{FILTER}"', '"wind_march_zonal_filter.json"'), "one component"),
     "no filter file": (replaced(TOML, f'"{FILTER}"', '"none.json"'), "none.json.*cannot be read"),
     "table of a plane missing": (section(INERTIA), "pitch.csv.*cannot be read"),
     "table of a plane too short": (inertia(8), "start_time_s = 10 is not before the end of pitch.csv at 8 s"),
     "table of a plane in another unit": (inertia(150, "time [s],moment_of_inertia [lb]"), r"unit is \[lb\]"),
     "table of a plane with another column": (inertia(150, "time [s],mass [kg]"), "moment_of_inertia.*is missing"),
+    "table of a plane with a row too short": (
+        lambda folder: (
+            inertia(150)(folder),
+            (folder / "pitch.csv").write_text((folder / "pitch.csv").read_text().replace("\n75,9e8\n", "\n75\n")),
+        )[0],
+        "pitch.csv, line 76.*1 cell|pitch.csv.*75",
+    ),
+    "table of a plane with times that go back": (
+        lambda folder: (
+            inertia(150)(folder),
+            (folder / "pitch.csv").write_text((folder / "pitch.csv").read_text().replace("\n75,9e8\n", "\n70,9e8\n")),
+        )[0],
+        "pitch.csv.*70 comes after 74; sort the rows",
+    ),
+    "product of inertia beyond any masses": (
+        product("9e15"), r"product.csv.*not below the root of the moments of inertia in pitch and yaw",
+    ),
+    "product of inertia that is no number": (product("nan"), "product.csv.*'nan' is not a finite number"),
+    "product of inertia of a file that is not there": (
+        section(PRODUCT), "product.csv.*cannot be read",
+    ),
     "table of a plane not positive": (inertia(150, cell="-9e8"), "is not positive"),
     "loads of a plane missing": (
         section(f'{LOADS}status = "assumed"\nsource = "made up"\n'), "short.csv.*cannot be read",
@@ -143,3 +193,19 @@ def test_a_table_of_one_plane_that_ends_early_ends_the_flight_there(vehicle_fold
     vehicle = load_vehicle(vehicle_folder, {"planes": "both"})
     assert vehicle.end == 100.0
     assert min(vehicle.sources, key=lambda s: s.last).file.name == "pitch.csv"
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("wind.azimuth", 72.0, "cannot be 72 rad, more than a turn; 72 deg is 1.257 rad"),
+        ("wind.azimuth", -90.0, "more than a turn"),
+        ("wind.azimuth", float("nan"), "finite"),
+        ("roll", 30.0, "cannot be 30 rad, more than a turn; 30 deg is 0.5236 rad"),
+    ],
+)
+def test_an_angle_in_degrees_where_rad_are_asked_for(name, value, message):
+    study = Study.load("as504", compile=False, changes={"planes": "both", "roll_deg": 0.0})
+    with pytest.raises(ParameterValueError, match=message):
+        study.with_parameters({name: value})
+    assert study.with_parameters({name: 1.0}).parameters[name].value == 1.0
