@@ -203,8 +203,8 @@ def _turns(case: Case, azimuths: Iterable[float] | None) -> tuple[NDArray[np.flo
     else:
         own = 0.0
     angles = np.array([own] if azimuths is None else [float(a) for a in azimuths])
-    if not angles.size or not (np.abs(angles) <= 2 * np.pi).all():
-        raise ParameterValueError("azimuths are numbers within a turn, 2 pi, in rad from north towards east")
+    if not angles.size or not np.isfinite(angles).all():
+        raise ParameterValueError("azimuths are finite numbers, rad from north towards east")
     if not both:
         return angles, [np.array([plane_weights(float(a), vehicle.file.planes)]) for a in angles]
     for a in angles:

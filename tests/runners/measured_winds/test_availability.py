@@ -132,7 +132,7 @@ def test_a_check_stops_the_bad_days(as504):
     ("change", "error", "says"),
     [
         ({"months": ["marsh"]}, UnknownNameError, "no month 'marsh'; did you mean 'march'"),
-        ({"azimuths": []}, ParameterValueError, "azimuths are numbers within a turn"),
+        ({"azimuths": []}, ParameterValueError, "azimuths are finite numbers"),
         ({"azimuths": [72.0]}, DataError, "are these degrees"),
         ({"threshold": 2.0}, ParameterValueError, "threshold = 2.0"),
         ({"check_hours": -1.0}, ParameterValueError, "a check -1.0 h before launch"),
