@@ -108,7 +108,10 @@ def availability(
             weight = np.einsum("mrck,cd->mrdk", by_level.weight.reshape(times.size, R, len(turn), -1), turn)
             weight, coarse = weight.reshape(times.size, R, -1), slice(None, None, COARSE)
             own_covariance = row[coarse] @ chain.covariance(others)[coarse] @ row[coarse].swapaxes(1, 2)
-            by_wind = (weight[coarse] @ field.wind.covariance) @ weight[coarse].swapaxes(1, 2)
+            seen = weight[coarse]  # one product of matrices, not one a time: the covariance is read once
+            by_wind = (seen.reshape(-1, seen.shape[2]) @ field.wind.covariance).reshape(seen.shape) @ seen.swapaxes(
+                1, 2
+            )
             parts = mean[coarse], symmetric(by_wind), symmetric(own_covariance)
             chance = loads.chances(mean[coarse], parts[1] + parts[2], limit[coarse], chosen)
             first, last = (COARSE * k for k in worth_while(chance))
@@ -118,12 +121,16 @@ def availability(
             within = chain.part(slice(first, last + 1))
             own = joint_covariance(within, row[first : last + 1][:, rows], others)[fine - first][:, :, fine - first]
             F = weight[fine][:, rows].reshape(fine.size * len(rows), -1)
-            covariance = (F @ field.wind.covariance @ F.T).reshape(own.shape) + own
+            met = np.flatnonzero(F.any(axis=0))  # levels that are reached by then: half of them at greatest q
+            F = F[:, met]
+            covariance = (F @ field.wind.covariance[np.ix_(met, met)] @ F.T).reshape(own.shape) + own
             through = _direct(case, some, times[fine]) if direct is None else direct[fine][:, rows]
             noise = _noise(case, month, turn, chain, fine, row[fine][:, rows], through, others)
             process = some.process(times[fine], mean[fine][:, rows], covariance, noise)
             shown = [limit.load for limit in some.limits]
-            p = Passage(case, shown, process, some.values(times[fine]), chosen, DESIGN, draws, seed).probability
+            p = Passage(
+                case, shown, process, some.values(times[fine]), chosen, DESIGN, draws, seed
+            ).probability.extrapolated
             found["probability"][i, j], found["standard_error"][i, j] = p.value, p.standard_error
             found["spacing_error"][i, j] = p.spacing_error
             low, high = _interval(loads, parts, limit[coarse], chosen, month.independent_samples)
@@ -148,7 +155,7 @@ def availability(
         "lower": "lower end of its 90 % interval, by the statistics' own sampling",
         "upper": "upper end of it",
         "standard_error": "of the importance sampling",
-        "spacing_error": "relative: what the grid of times still misses, estimated from half as many points",
+        "spacing_error": "relative: what the grid of times leaves open, estimated from half as many points",
         "stopped": "share of days that a check on the day of launch stops",
         "remaining_risk": "of passing any limit on the days that it lets go",
     }

@@ -33,6 +33,7 @@ from ..case.provenance import provenance
 from ..flight_load.limit_table import LimitError, Limits
 from ..flight_load.load import DESIGN
 from ..flight_load.passage import Passage
+from ..flight_load.probability import Estimate
 from ..flight_load.process import joint_covariance
 from ..flight_load.request import checked_draws
 from ..flight_load.window import checked_window, window_chain
@@ -43,7 +44,7 @@ from ..statistics.percentiles import Sides, checked_sides
 from ..statistics.resultants import resultant_pairs
 from .conditioning import Measured
 from .level_weights import LevelWeights
-from .limited_loads import LimitedLoads, Row, limited_loads, row_weights, symmetric
+from .limited_loads import LimitedLoads, kept_rows, limited_loads, row_weights, symmetric
 from .met_winds import MetWinds, met_winds
 from .other_winds import in_mean_winds
 from .persistence import ComponentPersistence, Persistence
@@ -53,6 +54,7 @@ from .wind_field import Lasting, WindField, default_persistence, wind_field
 
 STEPS, FINER = 240, 10  # of the window, and of each for the chance of passing a limit
 STRIDES = (1, 2, 5, FINER)  # of the finer steps, where there are many loads
+MOST_KEPT = 10_000  # loads and close times whose weights are made at once
 MOST_VALUES = 3000  # loads and times whose joint covariance is made
 LEFT_OUT = 2e-3  # of the instants' chances, at either end
 FEWEST = 4  # coarse steps looked at
@@ -136,22 +138,28 @@ class Flight:
         count = FINER * (last - first) + 1
         stride = next(k for k in STRIDES if k == FINER or count * len(loads.rows) <= k * MOST_VALUES)
         points = slice(FINER * first // stride, FINER * last // stride + 1)
-        season, about = (
-            window_chain(case, self.window, FINER * STEPS // stride).part(points) for case in (self.case, self.about)
-        )
-        _, _, mean = loads.over(season)
-        row, _, _ = loads.over(about, self.about)
-        weight = self._fine_weights(stride, loads.rows).weight[points]
-        return FinePart(season.times, weight, mean, joint_covariance(about, row), row @ about.noise_matrix)
+        whole = window_chain(self.case, self.window, FINER * STEPS // stride)
+        row, _, mean = (part if part is None else part[points] for part in kept_rows(self.case, loads, whole))
+        if self.about is self.case:
+            about = whole.part(points)
+        else:
+            about = window_chain(self.about, self.window, FINER * STEPS // stride).part(points)
+            row, _, _ = loads.over(about, self.about)
+        assert row is not None and mean is not None
+        weight = self.kept_weights(self.case, loads, self.window, self.field, stride).weight[points]
+        return FinePart(about.times, weight, mean, joint_covariance(about, row), row @ about.noise_matrix)
 
-    def _fine_weights(self, stride: int, rows: tuple[Row, ...]) -> LevelWeights:
-        """Return the weights of some rows at every so many of the close times of the window; kept."""
+    @staticmethod
+    def kept_weights(
+        case: Case, loads: LimitedLoads, window: tuple[float, float], field: WindField, stride: int
+    ) -> LevelWeights:
+        """Return the weights of some rows at every so many of the close times of a window; kept with the case."""
 
         def made() -> LevelWeights:
-            chain = window_chain(self.case, self.window, FINER * STEPS // stride)
-            return row_weights(self.case, replace(self.loads, rows=rows, limits=()), chain, self.field.levels)
+            chain = window_chain(case, window, FINER * STEPS // stride)
+            return row_weights(case, replace(loads, limits=()), chain, field.levels)
 
-        return self.case.kept(("fine weights", self.window, stride, rows), made)
+        return case.kept(("fine weights", window, stride, loads.rows), made)
 
 
 @dataclass(frozen=True, eq=False)
@@ -382,9 +390,23 @@ class DayOfLaunch:
         return self._passage(False)
 
     @property
+    def chance(self) -> Estimate:
+        """That any limit is passed during the flight, given the measurements, with its errors.
+
+        What is left of the wind varies fast, and the limit lies many of its deviations out: what the grid of times
+        misses, some per cent, is added by extrapolation.
+        """
+        return self.passage.probability.extrapolated
+
+    @property
+    def climatological_chance(self) -> Estimate:
+        """The same of the season."""
+        return self.climatological_passage.probability.extrapolated
+
+    @property
     def probability(self) -> float:
         """That any limit is passed during the flight, given the measurements."""
-        return self.passage.probability.value
+        return self.chance.value
 
     @property
     def go(self) -> bool:
@@ -615,7 +637,14 @@ def _flight(case: Case, loads: LimitedLoads, window: tuple[float, float]) -> Fli
         chain = window_chain(case, window, STEPS)
         row, _, mean = loads.over(chain)
         covariance = symmetric(row @ chain.covariance() @ row.swapaxes(1, 2))
-        weights = row_weights(case, loads, chain, field.levels)
+        if loads.limits and (FINER * STEPS + 1) * len(loads.rows) <= MOST_KEPT:  # those of the chance hold them
+            fine = Flight.kept_weights(case, loads, window, field, 1)
+            weights = replace(
+                fine, times=chain.times, weight=fine.weight[::FINER].copy(), rest=fine.rest[::FINER],
+                altitude=fine.altitude[::FINER],
+            )  # fmt: skip
+        else:
+            weights = row_weights(case, loads, chain, field.levels)
         return weights, weights.weight @ field.waves, mean, covariance
 
     weights, by_wave, mean, covariance = case.kept(("day of launch", loads.rows, window), made)

@@ -96,7 +96,7 @@ def launch_page(launch: DayOfLaunch, title: str, by_season: float | None = None)
     by_season : float, optional
         The chance with the vehicle's deviations acting on the season's mean flight.
     """
-    p, season = launch.passage.probability, launch.climatological_passage.probability
+    p, season = launch.chance, launch.climatological_chance
     low, high = p.interval
     lines = [
         f"# {'GO' if launch.go else 'NO-GO'}: {title}",

@@ -288,6 +288,18 @@ def _along_stations(case: Case, table: Limits) -> tuple[list[Row], list[Limit]]:
     return rows, found
 
 
+def kept_rows(case: Case, loads: LimitedLoads, chain: MarkovChain) -> tuple[Array, Array | None, Array]:
+    """Return :meth:`LimitedLoads.over` of a chain of the case, kept with it by times: loads along a vehicle are dear.
+
+    Parameters
+    ----------
+    case : Case
+    loads : LimitedLoads
+    chain : MarkovChain
+    """
+    return case.kept(("rows of loads", loads.rows, chain.times.tobytes()), lambda: loads.over(chain, case))
+
+
 def row_weights(case: Case, loads: LimitedLoads, chain: MarkovChain, levels: Array) -> LevelWeights:
     """Return the weights of the wind at levels (m) in rows at the times of a chain, kept with the case by those times.
 
@@ -302,6 +314,6 @@ def row_weights(case: Case, loads: LimitedLoads, chain: MarkovChain, levels: Arr
     outputs = [row.label for row in loads.rows if row.output is not None]
     if len(outputs) == len(loads.rows):
         return level_weights(case, times, levels, outputs)
-    state, direct, _ = loads.over(chain)
+    state, direct, _ = kept_rows(case, loads, chain)
     assert direct is not None
     return weights_of_rows(case, times, levels, state, direct)

@@ -111,7 +111,7 @@ def load_rows(
     along = _along(case, view, load, at, slosh_reaction, scope)
     chosen = np.arange(along.station.size) if stations is None else _chosen(along.station, stations, view, load)
     names = [prefix + name for name in _components(view)]
-    components = _with_components(case, vehicle)
+    components: Case = case.kept("load components", lambda: _with_components(case, vehicle))
     components.system.refuse_direct_noise(names)
     outputs = [components.system.output_index(name) for name in names]
     executable = components.executable.with_numbers(groups=case.with_means.groups)
@@ -180,8 +180,7 @@ def vehicle_stations(case: Case, load: str) -> Array:
     DataError, UnknownNameError
     """
     vehicle = case.vehicle_for(f"the {_words(load)} along the vehicle")
-    parts = [load_station_loads(vehicle, table) for table in _tables(load)]
-    return parts[0].station
+    return _tables_of(case, vehicle, load)[0].station
 
 
 def every_load_along_vehicle(
@@ -358,7 +357,7 @@ def _along(case: Case, vehicle: Vehicle, load: str, times: Array, slosh_reaction
     times = np.array([interval_before(case.executable, node).high for node in time_nodes(case.executable, times)])
     at = [_scoped(case.tables(float(time)), scope) for time in times]
     flight = {name: np.array([tables[name] for tables in at])[:, None] for name in at[0]}
-    parts = [load_station_loads(vehicle, table) for table in _tables(load)]
+    parts = _tables_of(case, vehicle, load)
     first = parts[0]
     if any(not np.array_equal(part.station, first.station) for part in parts):
         raise DataError(
@@ -380,6 +379,16 @@ def _along(case: Case, vehicle: Vehicle, load: str, times: Array, slosh_reaction
             across *= SIDES[load] * np.divide(2.0, radius, out=zero.copy(), where=radius > 0)[:, :, None]
         rows = rows + across
     return _Along(first.station, first.forward_of_gimbal, rows, constant)
+
+
+def _tables_of(case: Case, vehicle: Vehicle, load: str) -> list[StationLoads]:
+    """Return what a load's tables hold, read once a case: some 100 000 numbers each."""
+
+    def read(table: str) -> StationLoads:
+        question = ("station loads", station_table(vehicle, table).file, table, vehicle.file.planes)
+        return case.kept(question, lambda: load_station_loads(vehicle, table))
+
+    return [read(table) for table in _tables(load)]
 
 
 def _scoped(tables: dict[str, float], scope: str) -> dict[str, float]:

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import sounding_files as files
 import xarray as xr
+from scipy.io import netcdf_file
 from sounding_files import real_file
 
 from ascentwind.errors import MissingLibraryError
@@ -144,32 +145,57 @@ def test_real_igra():
     """Soundings of 158 and 157 levels, 4 and 1 of them without wind (counted with awk); the third is cut off."""
     found, quality = read_profiles(real_file("igra_USM00070026-data.txt.zip"))
     assert [s.altitude.size for s in found] == [154, 156]
-    assert quality.read == 3
+    assert (quality.read, quality.kept, quality.levels) == (3, 2, 310)
     assert quality.left_out == {"no wind": 5}
     assert "147 levels and 0 follow" in quality.dropped[0][1]
-    first = found[0]
+    first, second = found
     assert (first.station, first.time) == ("USM00070026", datetime.datetime(2010, 6, 1))
-    assert first.altitude[0] == 12.0
-    assert (first.u[0], first.v[0]) == pytest.approx(
-        (-2.0 * np.sin(np.radians(51)), -2.0 * np.cos(np.radians(51)))
-    ) or True
+    for sounding, speed in ((first, 5.1), (second, 7.2)):  # their first lines: 12 m, 20 deg, 51 and 72 tenths
+        assert sounding.altitude[0] == 12.0
+        d = np.radians(20)
+        assert (sounding.u[0], sounding.v[0]) == pytest.approx((-speed * np.sin(d), -speed * np.cos(d)), rel=1e-12)
 
 
-def test_real_wyoming():
-    (found,), quality = read_profiles(real_file("wyoming_boi_2010120912.csv"))
-    assert found.altitude.size == 131  # 132 lines, the last without wind
+@pytest.mark.parametrize(
+    ("name", "lines", "first", "top", "fastest"),
+    [
+        ("wyoming_boi_2010120912.csv", 132, (874.0, 240, 1.5), 32309.0, 58.7),
+        ("wyoming_oun_2023052212.csv", 256, (345.0, 0, 0.0), 34747.0, 26.2),
+    ],
+)
+def test_real_wyoming(name, lines, first, top, fastest):
+    """Every line but the last has a wind; first line, last height with a wind and largest speed by eye and awk."""
+    (found,), quality = read_profiles(real_file(name))
+    assert found.altitude.size == lines - 1
     assert quality.left_out == {"no wind": 1}
-    assert (found.altitude[0], found.u[0]) == (874.0, pytest.approx(1.5 * np.sin(np.radians(60))))
-    assert np.hypot(found.u, found.v).max() == pytest.approx(58.7)
+    height, direction, speed = first
+    d = np.radians(direction)
+    assert (found.altitude[0], found.altitude[-1]) == (height, top)
+    assert (found.u[0], found.v[0]) == pytest.approx((-speed * np.sin(d), -speed * np.cos(d)), rel=1e-12)
+    assert np.hypot(found.u, found.v).max() == pytest.approx(fastest)
 
 
 @pytest.mark.parametrize(("name", "count"), [("era5_peniche_2022_10.nc", 40), ("era5_peniche_2023_10.nc", 44)])
 def test_real_era5(name, count):
+    """Hours and levels by ncdump; the wind at 39.25 N, 9 W as the library that is not xarray reads it."""
     file = real_file(name)
     if name.endswith("2022_10.nc"):
         pytest.importorskip("h5netcdf")
+        h5py = pytest.importorskip("h5py")
+        with h5py.File(file) as raw:
+            values = {x: raw[x][7, :, 3, 0].astype(float) for x in "uvz"}
+            assert (float(raw["latitude"][3]), float(raw["longitude"][0])) == (39.25, -9.0)
+    else:
+        with netcdf_file(file, mmap=False) as raw:
+            values = {
+                x: raw.variables[x].scale_factor * raw.variables[x][7, :, 3, 0] + raw.variables[x].add_offset
+                for x in "uvz"
+            }
     found, quality = read_profiles(file, latitude=39.36, longitude=-8.9)
-    assert quality.kept == count
+    assert (quality.kept, quality.levels) == (count, 37 * count)
+    order = np.argsort(values["z"])
+    for have, x, scale in ((found[7].altitude, "z", 9.80665), (found[7].u, "u", 1.0), (found[7].v, "v", 1.0)):
+        np.testing.assert_allclose(have, values[x][order] / scale, rtol=1e-6, atol=1e-5)
     assert all(s.altitude.size == 37 and 47e3 < s.altitude[-1] < 49e3 for s in found)
     lowest = [s.altitude[0] for s in found]
     assert -50 < min(lowest) < max(lowest) < 400  # 1000 hPa
