@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from ..measured_winds.fly import FlownWinds
 
 SHOWN = 5  # of the worst profiles
+RESTS = 1e-9  # of the mean: a response that winds change by less rests
 
 
 def fly(
@@ -38,6 +39,8 @@ def fly(
     changes: Changes = None,
 ) -> None:
     """Fly measured winds: histories, percentiles and flight maxima beside what the vehicle's Gaussian wind predicts."""
+    import numpy as np
+
     from ...model.wind.soundings.read import read_soundings
     from ..case.times import parse_times
     from ..measured_winds.files import write_flown
@@ -59,11 +62,17 @@ def fly(
     job.written += write_flown(flown, job.folder)
     title = study.vehicle_for("a flown wind").title
     parts = [flown, flown.resultants] if resultant_pairs(names) else [flown]
+    moved = flown.predicted_std.max(axis=0) > RESTS * np.abs(flown.predicted_mean).max(axis=0)
+    still = [name for name, moves in zip(flown.responses, moved.tolist(), strict=True) if not moves]
     for part in parts:
         for name in part.responses:
-            job.written += write_figure(flown_figure(part, name, title), job.folder, f"flown_{name}")
+            if name not in still:
+                job.written += write_figure(flown_figure(part, name, title), job.folder, f"flown_{name}")
     for line in read.quality.lines():
         console.print(line, style="dim", soft_wrap=True, highlight=False, markup=False)
+    if still:
+        told = f"Without a figure, since winds do not move it: {', '.join(map(words, still))}"
+        console.print(told, style="dim", soft_wrap=True, highlight=False, markup=False)
     print_flown(flown)
     last, name = parts[-1], parts[-1].responses[0]
     table = Table("profile", "date", title=f"Largest {words(name)}")

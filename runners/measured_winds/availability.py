@@ -39,7 +39,7 @@ from ..solvers.time_nodes import interval_before
 from ..statistics.norm import NormOfNormal
 from ..statistics.percentiles import Sides, checked_sides, instant_level
 from .conditioning import Measured
-from .day_of_launch import ERROR, MOST_VALUES, matter, worth_while
+from .day_of_launch import ERROR, matter, worth_while
 from .level_weights import WINDS
 from .limited_loads import LimitedLoads, limited_loads, row_weights, symmetric
 from .other_winds import in_mean_winds
@@ -49,6 +49,7 @@ from .wind_field import WindField, default_persistence
 STEPS = 1200  # of the window, at most
 MOST_WEIGHTS = 1200  # loads times coarse steps
 COARSE = 8  # every so many are looked at, to see where passing is worth while
+MOST_VALUES = 3000  # loads and times whose joint covariance is made
 MOST = 600  # points of time at which passing is computed
 SPACING = 25.0  # m, of the levels
 CONFIDENCE = 0.9  # of intervals by the statistics' own sampling

@@ -55,7 +55,7 @@ from .wind_field import Lasting, WindField, default_persistence, wind_field
 STEPS, FINER = 240, 10  # of the window, and of each for the chance of passing a limit
 STRIDES = (1, 2, 5, FINER)  # of the finer steps, where there are many loads
 MOST_KEPT = 10_000  # loads and close times whose weights are made at once
-MOST_VALUES = 3000  # loads and times whose joint covariance is made
+MOST_VALUES = 2000  # loads and times whose joint covariance is made: its draws take a second
 LEFT_OUT = 2e-3  # of the instants' chances, at either end
 FEWEST = 4  # coarse steps looked at
 ERROR = 1.0  # m/s in a component, of a balloon's wind
@@ -146,8 +146,17 @@ class Flight:
             about = window_chain(self.about, self.window, FINER * STEPS // stride).part(points)
             row, _, _ = loads.over(about, self.about)
         assert row is not None and mean is not None
-        weight = self.kept_weights(self.case, loads, self.window, self.field, stride).weight[points]
+        if self.holds_close_times(self.loads):  # of all rows: another balloon may need others of them
+            weight = self.kept_weights(self.case, self.loads, self.window, self.field, 1).weight[::stride][points]
+            weight = weight[:, [self.loads.rows.index(row) for row in loads.rows]]
+        else:
+            weight = self.kept_weights(self.case, loads, self.window, self.field, stride).weight[points]
         return FinePart(about.times, weight, mean, joint_covariance(about, row), row @ about.noise_matrix)
+
+    @staticmethod
+    def holds_close_times(loads: LimitedLoads) -> bool:
+        """Return whether the weights of loads at all close times are few enough to be made with the coarse ones."""
+        return bool(loads.limits) and (FINER * STEPS + 1) * len(loads.rows) <= MOST_KEPT
 
     @staticmethod
     def kept_weights(
@@ -637,7 +646,7 @@ def _flight(case: Case, loads: LimitedLoads, window: tuple[float, float]) -> Fli
         chain = window_chain(case, window, STEPS)
         row, _, mean = loads.over(chain)
         covariance = symmetric(row @ chain.covariance() @ row.swapaxes(1, 2))
-        if loads.limits and (FINER * STEPS + 1) * len(loads.rows) <= MOST_KEPT:  # those of the chance hold them
+        if Flight.holds_close_times(loads):
             fine = Flight.kept_weights(case, loads, window, field, 1)
             weights = replace(
                 fine, times=chain.times, weight=fine.weight[::FINER].copy(), rest=fine.rest[::FINER],

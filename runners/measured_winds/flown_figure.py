@@ -59,7 +59,7 @@ def flown_figure(flown: FlownWinds | FlownResultants, response: str, title: str)
         above.plot(times, factor * values[i], color=COLORS["combined"], lw=1.6, label=label)
         above.plot(at, factor * worst, "o", color=COLORS["combined"], ms=5)
         above.set(xlabel="flight time (s)", ylabel=f"{words(response)} ({unit})", xlim=(times[0], times[-1]))
-        above.legend(loc="upper right", fontsize=8)
+        above.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=4, fontsize=8)
         measured = np.sort(flown.maxima[:, r])
         below.step(factor * measured, 1 - (np.arange(measured.size) + 0.5) / measured.size, where="mid",
                    color=COLORS["combined"], lw=1.6, label=f"{len(values)} measured profiles")  # fmt: skip
@@ -67,7 +67,11 @@ def flown_figure(flown: FlownWinds | FlownResultants, response: str, title: str)
         below.plot(factor * predicted, 1 - (np.arange(predicted.size) + 0.5) / predicted.size, color=SHADES[0], lw=1.6,
                    label="Gaussian wind, at the same times")  # fmt: skip
         below.set(xlabel=f"largest size over the times ({unit})", ylabel="share of flights beyond", yscale="log")
-        below.set_ylim(0.5 / max(len(values), 100), 1.1)
+        least = 0.5 / max(len(values), 100)
+        below.set_ylim(least, 1.1)
+        sizes = np.concatenate([measured, predicted])
+        right = max(measured[-1], np.quantile(predicted, 1 - least))
+        below.set_xlim(factor * sizes.min(), factor * (right + 0.03 * (right - sizes.min())))
         below.legend()
         figure.suptitle(wrapped(f"{title}\n{words(response).capitalize()} in measured winds"))
     return figure

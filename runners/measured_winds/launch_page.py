@@ -55,7 +55,7 @@ def drivers(launch: DayOfLaunch) -> list[str]:
             level = launch.law(load.label).percentile(passage.design)
             at = int((level / values).argmax())
             told.append(
-                f"{words(load.label)}: passed by {chance:.2g} of flights; nearest at {launch.times[at]:.1f} s, "
+                f"{load_words(load)}: passed by {chance:.2g} of flights; nearest at {launch.times[at]:.1f} s, "
                 f"{climb.altitude[at] / 1000:.1f} km: {factor * level[at]:.4g} is passed with {passage.design:g} at "
                 f"that instant, limit {factor * values[at]:.4g} {unit}"
             )
@@ -64,7 +64,7 @@ def drivers(launch: DayOfLaunch) -> list[str]:
         at = int(np.nanargmin(margin))
         share = float(np.clip(by_wind[at, r] / launch.std[at, r] ** 2, 0, 1)) if launch.std[at, r] > 0 else 0.0
         told.append(
-            f"{words(load.label)}: passed by {chance:.2g} of flights; nearest at {launch.times[at]:.1f} s, "
+            f"{load_words(load)}: passed by {chance:.2g} of flights; nearest at {launch.times[at]:.1f} s, "
             f"{climb.altitude[at] / 1000:.1f} km: expected {factor * launch.mean[at, r]:.4g}, one sigma "
             f"{factor * launch.std[at, r]:.3g}, limit {factor * values[at]:.4g} {unit}, {margin[at]:.1f} sigma off; "
             f"{100 * share:.0f} % of that variance is wind that may still change or was not seen, the rest the "
@@ -73,11 +73,17 @@ def drivers(launch: DayOfLaunch) -> list[str]:
     return told
 
 
+def load_words(load: LimitedLoad) -> str:
+    """Return what is limited, in words."""
+    return words(load.name) if np.isnan(load.station) else f"{words(load.name)} at station {load.station:.4g} m"
+
+
 def often_passed(launch: DayOfLaunch, most: int) -> list[tuple[float, LimitedLoad, Limit, NDArray[np.float64]]]:
     """Return the limits that are passed most often: with what chance, what of, and their values over the times."""
     loads, passage = launch.flight.loads, launch.passage
+    grid = launch.chance.value / passage.probability.value if passage.probability.value > 0 else 1.0
+    chance, values, found = np.minimum(passage.by_load.values * grid, 1.0), loads.values(launch.times), []
     by_label = {limit.load.label: k for k, limit in enumerate(loads.limits)}
-    chance, values, found = passage.by_load.values, loads.values(launch.times), []
     for k in np.argsort(-chance)[:most]:
         load = passage.loads[int(k)]
         number = by_label[load.label]
@@ -97,12 +103,17 @@ def launch_page(launch: DayOfLaunch, title: str, by_season: float | None = None)
         The chance with the vehicle's deviations acting on the season's mean flight.
     """
     p, season = launch.chance, launch.climatological_chance
-    low, high = p.interval
+    (low, high), open_part = p.interval, p.spacing_error * p.value
     lines = [
         f"# {'GO' if launch.go else 'NO-GO'}: {title}",
         "",
         f"- Chance of passing any limit: **{p.value:.2g}** (95 % of the sampling: {low:.2g} to {high:.2g}; threshold "
         f"{launch.threshold:g}; the grid of times leaves {100 * p.spacing_error:.1f} % of it open)",
+        *(
+            ["- The threshold lies within what the draws and the grid leave open: the answer hangs on them"]
+            if low - open_part < launch.threshold < high + open_part
+            else []
+        ),
         f"- Of the season, nothing measured: {season.value:.2g}",
         *(
             []
@@ -168,12 +179,18 @@ def launch_figure(launch: DayOfLaunch, title: str) -> Figure:
             for side in {"both": both, "upper": (1,), "lower": (-1,)}[launch.sides]:
                 panel.plot(launch.times, side * factor * values, color=COLORS["combined"], lw=1.8,
                            label="limit" if side == 1 or launch.sides == "lower" else None)  # fmt: skip
-            panel.set(ylabel=f"{words(load.label)} ({unit})", xlim=(launch.times[0], launch.times[-1]))
+            panel.set(
+                ylabel=load_words(load).replace(" at station", "\nat station") + f" ({unit})",
+                xlim=(launch.times[0], launch.times[-1]),
+            )
             if not k:
                 panel.legend(fontsize=8, ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.0))
             if k == len(shown) - 1:
                 panel.set_xlabel("flight time (s)")
-        told = f"\n{'GO' if launch.go else 'NO-GO'}: {launch.probability:.2g} of flights pass a limit"
+        told = (
+            f"\n{'GO' if launch.go else 'NO-GO'}: {launch.probability:.2g} of flights pass a limit, threshold "
+            f"{launch.threshold:g}"
+        )
         figure.suptitle(wrapped(f"{title}{told}"))
     return figure
 
@@ -201,7 +218,7 @@ def draw_wind(axes: Axes, launch: DayOfLaunch, number: int) -> None:
     h, mean, std = found["altitude"].values / 1000, found["mean"].values, found["std"].values
     season, wide = found["climatology"].values, BAND * found["climatological_std"].values
     axes.fill_betweenx(h, season - wide, season + wide, color="#bbbbbb", alpha=0.35, lw=0, label="season, 90 %")
-    axes.plot(season, h, color=COLORS["mean"], lw=1)
+    axes.plot(season, h, color=COLORS["mean"], lw=1, label="season, mean")
     axes.fill_betweenx(h, mean - BAND * std, mean + BAND * std, color=COLORS["wind"], alpha=0.3, lw=0,
                        label="at launch, 90 %")  # fmt: skip
     axes.plot(mean, h, color=COLORS["wind"], lw=1.6)
