@@ -61,7 +61,7 @@ def resultants_csv(found: xr.Dataset) -> str:
 
 
 def resultants_along_figure(found: xr.Dataset, time: float, title: str) -> Figure:
-    """Return the resultant at every station at a time (s), beside each plane alone, and the largest of all times."""
+    """Return the resultant at every station at a time (s), beside each plane alone, and the largest of several times."""
     part, station = found.sel(time=time), found["station"].values
     factor, unit = display(found["level"].attrs["units"], found["level"].values)
     mean = part["plane_mean"].values
@@ -69,8 +69,11 @@ def resultants_along_figure(found: xr.Dataset, time: float, title: str) -> Figur
     with rc_context(STYLE):
         figure = Figure(layout="constrained")
         axes = figure.subplots()
-        envelope = factor * found["level"].max("time")
-        axes.fill_between(station, 0, envelope, color=COLORS[COMBINED], alpha=0.1, lw=0, label="largest of all times")
+        if found.sizes["time"] > 1:
+            envelope = factor * found["level"].max("time")
+            axes.fill_between(
+                station, 0, envelope, color=COLORS[COMBINED], alpha=0.1, lw=0, label="largest of all times"
+            )
         axes.plot(station, factor * part["level"], color=COLORS[COMBINED], lw=2, label=f"resultant at {time:g} s")
         for k, plane in enumerate(found["plane"].values):
             alone = np.abs(mean[:, k]) + SIGMAS * np.sqrt(np.maximum(covariance[:, k, k], 0.0))

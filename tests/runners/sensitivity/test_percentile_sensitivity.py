@@ -13,6 +13,7 @@ import ascentwind as aw
 from ascentwind.model import define_system
 from ascentwind.model.errors import ParameterValueError, PlanesError, TimeRangeError, UnknownNameError
 from ascentwind.runners.flight_load.probability import root_between
+from ascentwind.runners.sensitivity import percentile
 from ascentwind.runners.sensitivity.derivative_figures import heading
 from ascentwind.runners.station_loads.loads_along_vehicle import resultant_along_vehicle
 
@@ -117,3 +118,23 @@ def test_refused_of_both(both):
         both.percentile_sensitivity("resultant_bending_moment", 500.0)
     with pytest.raises(PlanesError, match="a design wind"):
         both.design_wind("yaw_bending_moment", 75.0)
+
+
+def test_all_derivatives_cost_one_law_one_flight_and_two_adjoint_pairs(swelling, monkeypatch):
+    """However many parameters: the work is some four tables of both planes, of which this is the count."""
+    made = {name: 0 for name in ("AdjointPair", "_laws", "until")}
+
+    def counted(name: str, of):
+        def call(*args, **options):
+            made[name] += 1
+            return of(*args, **options)
+
+        return call
+
+    monkeypatch.setattr(percentile, "AdjointPair", counted("AdjointPair", percentile.AdjointPair))
+    monkeypatch.setattr(percentile, "_laws", counted("_laws", percentile._laws))
+    monkeypatch.setattr(percentile.FlightNodes, "until", counted("until", percentile.FlightNodes.until))
+    for parameters in (None, ["a"]):
+        made.update(dict.fromkeys(made, 0))
+        swelling.percentile_sensitivity("resultant_load", 1.0, 0.01, parameters)
+        assert made == {"AdjointPair": 2, "_laws": 1, "until": 1}
