@@ -61,7 +61,7 @@ def resultants_csv(found: xr.Dataset) -> str:
 
 
 def resultants_along_figure(found: xr.Dataset, time: float, title: str) -> Figure:
-    """Return the resultant at every station at a time (s), beside each plane alone, and the largest of several times."""
+    """Return the resultant at every station at a time (s), beside each plane alone and the largest of several times."""
     part, station = found.sel(time=time), found["station"].values
     factor, unit = display(found["level"].attrs["units"], found["level"].values)
     mean = part["plane_mean"].values
