@@ -102,7 +102,7 @@ def availability(
     job.written.append(write_text(job.folder / "availability.csv", text))
     title = study.vehicle_for("availability").title
     planes = "both planes" if found.attrs["plane"] == "both" else f"{found.attrs['plane']} plane"
-    heading = f"{title}\n{planes.capitalize()}, winds of {found.attrs['site']}"
+    heading = f"{title}\n{planes.capitalize()}: the months' winds of {found.attrs['site']}, not the vehicle's own"
     job.written += write_figure(availability_figure(found, heading), job.folder, "availability")
     worst = found["level"].max(dim=("month", "azimuth")).values
     for name in found["response"].values[np.argsort(-worst, kind="stable")[:MOST_ROSES]]:

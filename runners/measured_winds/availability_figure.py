@@ -10,7 +10,8 @@ from matplotlib.projections.polar import PolarAxes
 
 from ..present.style import STYLE, Figure, display, words, wrapped
 
-LEAST = 1e-6
+LEAST = 1e-6  # of the colours
+MOST_OF_SECTOR, EDGE = 120.0, 10.0  # deg of azimuths drawn as a sector, and beside them
 
 
 def availability_figure(found: xr.Dataset, title: str) -> Figure:
@@ -27,19 +28,20 @@ def availability_figure(found: xr.Dataset, title: str) -> Figure:
     matplotlib.figure.Figure
     """
     p = np.maximum(found["probability"].values, LEAST)
-    months, angles = [str(m) for m in found["month"].values], np.degrees(found["azimuth"].values)
+    months, angles = [str(m).capitalize() for m in found["month"].values], np.degrees(found["azimuth"].values)
     with rc_context({**STYLE, "axes.grid": False}):
         figure = Figure(figsize=(2.5 + 0.75 * max(angles.size, 4), 1.8 + 0.42 * len(months)), layout="constrained")
         axes = figure.subplots()
         image = axes.imshow(p, aspect="auto", cmap="YlOrRd", norm=LogNorm(min(p.min(), 1e-4), max(p.max(), 1e-2)))
         for i, j in np.ndindex(*p.shape):
             shade = float(np.asarray(image.norm(p[i, j])))
-            axes.text(j, i, f"{found['probability'].values[i, j]:.1g}", ha="center", va="center", fontsize=8,
+            axes.text(j, i, f"{found['probability'].values[i, j]:.2g}", ha="center", va="center", fontsize=8,
                       color="white" if shade > 0.65 else "black")  # fmt: skip
         axes.set_xticks(range(angles.size), [f"{a:.4g}" for a in angles])
         axes.set_yticks(range(len(months)), months)
         axes.set(xlabel="launch azimuth (deg)")
-        figure.colorbar(image, label="flights that pass a limit")
+        beyond = "min" if (found["probability"].values < LEAST).any() else "neither"
+        figure.colorbar(image, label="share of flights that pass a limit", extend=beyond)
         figure.suptitle(wrapped(title), fontsize=11)
     return figure
 
@@ -59,7 +61,7 @@ def load_rose(found: xr.Dataset, response: str, title: str) -> Figure:
     """
     values = found["level"].sel(response=response).values
     factor, unit = display(str(found["unit"].sel(response=response).values), values)
-    months, angles = [str(m) for m in found["month"].values], found["azimuth"].values
+    months, angles = [str(m).capitalize() for m in found["month"].values], found["azimuth"].values
     colors = colormaps["turbo"](np.linspace(0.05, 0.95, len(months)))
     with rc_context(STYLE):
         figure = Figure(figsize=(7.5, 6.5), layout="constrained")
@@ -70,6 +72,11 @@ def load_rose(found: xr.Dataset, response: str, title: str) -> Figure:
         for row, month, color in zip(values, months, colors, strict=True):
             axes.plot(angles, factor * row, "o-", ms=3, lw=1.4, color=color, label=month)
         axes.set_rlim(0)
+        first, last = np.degrees(angles.min()), np.degrees(angles.max())
+        if 0 < last - first <= MOST_OF_SECTOR:  # the rest of the compass is empty
+            axes.set_thetamin(EDGE * np.floor(first / EDGE) - EDGE)
+            axes.set_thetamax(EDGE * np.ceil(last / EDGE) + EDGE)
+            axes.set_xticks(np.radians(np.arange(EDGE * np.floor(first / EDGE), last + EDGE, EDGE)))
         axes.legend(loc="center left", bbox_to_anchor=(1.08, 0.5), fontsize=8)
         told = f"{title}\n{words(response)} ({unit}): largest level passed with 0.00135 at an instant"
         axes.set_title(wrapped(told), fontsize=10)
