@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -727,6 +727,7 @@ class Study(Case):
         sides: Sides = "both",
         draws: int = DRAWS,
         seed: int = 0,
+        progress: Callable[[int, int], None] | None = None,
     ) -> xr.Dataset:
         """Return the chance that a flight passes its limits, by month and launch azimuth, in the vehicle's plane.
 
@@ -751,6 +752,8 @@ class Study(Case):
         draws : int
             Paths of the importance sampling.
         seed : int
+        progress : callable, optional
+            Called with how many months and azimuths are done, and how many there are.
 
         Returns
         -------
@@ -762,7 +765,9 @@ class Study(Case):
         ------
         NoVehicleError, DataError, LimitError, UnknownNameError, ParameterValueError, TimeRangeError
         """
-        return availability(self, limits, months, azimuths, winds, window, check_hours, threshold, sides, draws, seed)
+        return availability(
+            self, limits, months, azimuths, winds, window, check_hours, threshold, sides, draws, seed, progress
+        )
 
     def predict_wind(
         self, altitude: ArrayLike, wind: ArrayLike, ahead: ArrayLike, *, error: float = ERROR

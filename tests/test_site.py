@@ -42,6 +42,11 @@ def test_every_page_is_in_the_menu():
     assert sorted(named) == sorted(p.relative_to(docs).as_posix() for p in there)
 
 
+def test_the_gallery_shows_every_figure():
+    shown = re.findall(r"\(figures/(\w+\.png)\)", (ROOT / "docs" / "gallery.md").read_text())
+    assert sorted(shown) == sorted(p.name for p in (ROOT / "docs" / "figures").iterdir())
+
+
 def test_formulas_become_those_of_the_site():
     hooks = runpy.run_path(str(ROOT / "tools" / "site_hooks.py"))
     text = "of $`t_2`$:\n\n```math\na = b\n```\n\n```sh\necho $HOME\n```\n"

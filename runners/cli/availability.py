@@ -74,10 +74,10 @@ def availability(
     limits = Limits.read(limit)
     study = load_study(vehicle, changes, ["title", "default_times"] if window is None else ["title"])
     job = Job(out or results_folder(vehicle, "availability"))
-    with console.status("months and azimuths"):
+    with steps("months and azimuths") as bar:
         found = study.availability(
             limits, months=names, azimuths=angles, winds=winds, window=flown, check_hours=check_hours,
-            threshold=threshold, sides=chosen, draws=draws, seed=seed,
+            threshold=threshold, sides=chosen, draws=draws, seed=seed, progress=bar.reached,
         )  # fmt: skip
     job.replace_earlier("availability", study)
     kept = [

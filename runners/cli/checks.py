@@ -33,6 +33,7 @@ def verify(
     from ..case.times import parse_times, spread_over
     from ..present.style import write_figure
     from ..statistics.agreement import agreement
+    from ..statistics.engines import ENGINES
     from ..statistics.ensemble import Ensemble
     from ..statistics.response_figures import sample_path_figure
 
@@ -42,8 +43,8 @@ def verify(
     end_times = parse_times(times) if times else spread_over(parse_times(flown.file.default_times), 4)
     study.checked_times(end_times)
     job = Job(out) if out else None
-    with console.status("computing with every engine"):
-        found = agreement(study, end_times, ensemble)
+    with steps("every engine", (len(ENGINES) - 1) * len(end_times) + 1) as bar:  # simulated flights are of all at once
+        found = agreement(study, end_times, ensemble, lambda t: bar.done(f"every engine, {t:g} s"))
     _print_agreement(found)
     if found.resultants is not None:
         _print_resultants(found.resultants)

@@ -11,7 +11,7 @@ sounding lies above the threshold.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -70,8 +70,10 @@ def availability(
     sides: Sides,
     draws: int,
     seed: int,
+    progress: Callable[[int, int], None] | None = None,
 ) -> xr.Dataset:
     """See :meth:`Study.availability`."""
+    told = progress or (lambda done, total: None)
     checked_draws(draws, seed)
     chosen, flown = checked_sides(sides), checked_window(case, window)
     if not 0 < threshold < 1:
@@ -102,6 +104,7 @@ def availability(
     for i, month in enumerate(seasons):
         field = WindField(_wind(month, levels))
         for j, turn in enumerate(turns):
+            told(i * len(turns) + j, len(seasons) * len(turns))
             about = _in_mean(case, month, turn)
             chain = window_chain(about, flown, steps)
             row, direct, mean = loads.over(chain, about)
@@ -151,6 +154,7 @@ def availability(
                     field, some, weight[at][:, rows], mean[at][:, rows], covariance[which][:, :, which],
                     some.values(times[at]), chosen, check_hours, threshold, seed,
                 )  # fmt: skip
+    told(len(seasons) * len(turns), len(seasons) * len(turns))
     meanings = {
         "probability": "of passing any limit in a flight",
         "lower": "lower end of its 90 % interval, by the statistics' own sampling",
