@@ -77,7 +77,12 @@ def winds(folder: Path) -> None:
         packed.writestr("USM00074794-data.txt", igra_text(altitude, u, v, when=days(range(3), [3])))
     (folder / "mine.csv").write_text(own_text(altitude, *np.tile([u, v], (1, 4, 1))), encoding="utf-8")
     for name, row in (("balloon", 0), ("early", 0), ("late", 1), ("later", 1)):
-        (folder / f"{name}.csv").write_text(own_text(altitude, u[[row]], v[[row]]), encoding="utf-8")
+        rows = [
+            f"{name},{h:.0f},{along:.2f},{across:.2f}"
+            for h, along, across in zip(altitude, u[row], v[row], strict=True)
+        ]
+        lines = ["profile,altitude [m],u [m/s],v [m/s]", *rows]
+        (folder / f"{name}.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 def days(years, months):

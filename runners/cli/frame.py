@@ -44,7 +44,7 @@ NEXT: dict[str, tuple[tuple[str, str], ...]] = {
     "equations": (("inspect {vehicle} --time T", "their numbers at a time"),),
     "wind apply": (("run {vehicle}", "with this wind"),),
     "wind read": (("wind stats --soundings FILE", "their statistics"),),
-    "wind months": (("availability VEHICLE --winds FILE --limit FILE", "the odds of each month"),),
+    "wind months": (("availability VEHICLE --winds DIR --limit FILE", "the odds of each month"),),
     "wind stats": (("wind fit", "a filter of this wind"),),
     "wind fit": (("wind check {out}", "the filter against its data"), ("report {folder}", "one page of it")),
     "wind check": (("wind plot {filter_file}", "figures of the filter"),),
@@ -122,6 +122,8 @@ def _hint(name: str, given: Mapping[str, Any], folder: Path | None) -> None:
         known["folder"] = str(Path(known["out"]).parent)
     told = []
     for typed, why in NEXT[name]:
+        if given.get("report") and typed.startswith("report "):
+            continue  # it has just written that page
         try:
             told.append(f"'ascentwind {typed.format(**known)}' for {why}")
         except KeyError:
