@@ -330,3 +330,4 @@ def test_the_command_run_writes_the_page_of_a_system(ascentwind, tmp_path, monke
     assert "ascentwind run --system s.toml --times 1,4 --report" in read.text
     row = next(r for r in read.rows if r[0] == "x")
     assert row[5] == f"{3 * math.sqrt(1 - math.exp(-4)):.4g}"
+    assert "for one page of it" not in said  # it is written
