@@ -27,6 +27,9 @@ def environment(folder: Path) -> dict[str, str]:
     home.mkdir()
     path = os.pathsep.join([str(Path(sys.executable).parent), "/usr/local/bin", "/usr/bin", "/bin"])
     kept = {name: os.environ[name] for name in os.environ if name.startswith(("PIP_", "SSL_", "HTTP", "NO_PROXY"))}
+    for settings in (".config/pip/pip.conf", ".pip/pip.conf"):  # where packages come from here
+        if (Path.home() / settings).is_file():
+            kept.setdefault("PIP_CONFIG_FILE", str(Path.home() / settings))
     return {"PATH": path, "HOME": str(home), "LANG": "C.UTF-8", **kept}
 
 
