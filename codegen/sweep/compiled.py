@@ -40,7 +40,7 @@ def sweep_recipe(system: LinearSystem, functions: SweepFunctions) -> Recipe:
         system,
         "sweep",
         fingerprint=lambda: sweep_fingerprint(system, functions),
-        source=lambda: sweep_source(system, functions),
+        source=lambda: sweep_source(system, functions, with_grid=True),
         difference=lambda library: difference_from_interpreter(CompiledSweep(system, functions, library)),
         agreement=AGREEMENT,
         optimised=True,

@@ -11,12 +11,13 @@ from ..system.functions import declared_sizes, state_scales
 from ..system.nominal import NominalNumbers
 from .integrator import CompiledSweep
 from .runge_kutta import DOP853
-from .segments import Segments
+from .segments import GridSteps, Segments
 
 AGREEMENT = 1e-7  # of scaled numbers; a wrong library is off in the first digits
 STEP_TIMES_ROOT, LONGEST, SHORTEST = 0.1, 1e-2, 1e-6  # s, of what is integrated; the interpreter takes one step
 POINTS = 3  # one that agrees is enough: an undeclared jump may lie within another
 TOLERANCE = 1e-8
+LEAST_CHANGE = 1e-6  # of the identity: below, what a step adds to it drowns in rounding
 
 
 def difference_from_interpreter(sweep: CompiledSweep, seed: int = 504) -> float:
@@ -63,25 +64,35 @@ def _difference_at(sweep: CompiledSweep, numbers: NominalNumbers, time: float) -
     try:
         found = sweep.integrate(numbers, segments, TOLERANCE, state, sizes, steps=True)
         means, outputs, _ = sweep.mean_history(numbers, segments, TOLERANCE, sizes)
+        on_grid, grid_state = found, state
+        if sweep.takes_a_grid:
+            grid_state = np.zeros((s, n, n))
+            step = GridSteps.equal(segments, np.ones(1, np.intc))
+            on_grid = sweep.on_grid(numbers, segments, step, state=grid_state, steps=True)
     except AscentwindError:
         return np.inf
-    assert found.transition is not None
-    difference = [
-        _apart(found.transition[0] / scale[:, None] * scale, Phi / scale[:, None] * scale - np.eye(n), np.eye(n)),
-        *(_apart(a / np.outer(scale, scale), b / np.outer(scale, scale)) for a, b in zip(state, P, strict=True)),
+    difference = []
+    for by_formula, own in ((found, state), (on_grid, grid_state)):
+        assert by_formula.transition is not None
+        transition = by_formula.transition[0] / scale[:, None] * scale
+        difference += [
+            _apart(transition, Phi / scale[:, None] * scale - np.eye(n), np.eye(n)),
+            *(_apart(a / np.outer(scale, scale), b / np.outer(scale, scale)) for a, b in zip(own, P, strict=True)),
+            _apart(by_formula.mean[0], response),
+        ]
+    difference += [
         # of its own P, held against ours above: where noise reaches a response through many states, its variance from
         # rest grows as a power of time that neither formula integrates exactly
         *(_apart(np.diag(a), np.diag(C @ P @ C.T)) for a, P in zip(found.covariance[0], state, strict=True)),
         _apart(means[1] / scale, m / scale),
         _apart(outputs[1], response),
-        _apart(found.mean[0], response),
     ]
     return float(max(difference))
 
 
 def _apart(found: NDArray, expected: NDArray, less: NDArray | float = 0.0) -> float:
     """Return the largest difference relative to the largest number expected."""
-    size = float(np.abs(expected).max(initial=0.0))
+    size = max(float(np.abs(expected).max(initial=0.0)), LEAST_CHANGE * float(np.abs(less).max(initial=0.0)))
     difference = float(np.abs(found - less - expected).max(initial=0.0))
     return 0.0 if difference == 0 else difference / max(size, 1e-300) if np.isfinite(difference) else np.inf
 

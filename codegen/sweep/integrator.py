@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,10 +14,12 @@ from ..system.executable import ExecutableSystem
 from ..system.functions import declared_sizes
 from ..system.nominal import NominalNumbers
 from ..toolchain.library import Library
-from .segments import SegmentResults, Segments
-from .source import MOST_STEPS, SweepFunctions
+from .kinds import kinds
+from .on_grid import takes_a_grid
+from .segments import GridSteps, SegmentResults, Segments
+from .source import LANES, MOST_STEPS, SweepFunctions
 
-NOT_FINITE, TOO_SMALL_A_STEP, OUT_OF_RANGE, TOO_MANY_STEPS = 1, 2, 3, 4  # as in the template
+NOT_FINITE, TOO_SMALL_A_STEP, OUT_OF_RANGE, TOO_MANY_STEPS, NEARLY_SINGULAR = 1, 2, 3, 4, 5  # as in the templates
 COUNTERS = ("steps", "rejected", "evaluations")
 
 
@@ -54,10 +57,65 @@ class CompiledSweep:
         ------
         IntegrationError, DataError
         """
+        return self.integrate(executable, segments, tolerance, self._start(executable.parameters), sizes, steps)
+
+    def _start(self, parameters: NDArray[np.float64]) -> NDArray[np.float64]:
         system, n = self.system, len(self.system.states)
-        covariances = [system.start_covariance_matrix(name, executable.parameters) for name in system.sources]
-        state = np.ascontiguousarray(np.array(covariances).reshape(len(system.sources), n, n))
-        return self.integrate(executable, segments, tolerance, state, sizes, steps)
+        covariances = [system.start_covariance_matrix(name, parameters) for name in system.sources]
+        return np.ascontiguousarray(np.array(covariances, float).reshape(len(system.sources), n, n))
+
+    @cached_property
+    def takes_a_grid(self) -> bool:
+        """Whether the library holds the sweep on a given grid."""
+        A = self.functions.stage.sparsity_out(0)
+        return takes_a_grid(kinds(A, LANES), A)
+
+    def on_grid(
+        self,
+        executable: ExecutableSystem | NominalNumbers,
+        segments: Segments,
+        grid: GridSteps,
+        state: NDArray[np.float64] | None = None,
+        steps: bool = False,
+    ) -> SegmentResults:
+        """Sweep over segments with given steps, of Gauss collocation of order 8.
+
+        Parameters
+        ----------
+        executable : ExecutableSystem
+            Parameters and tables.
+        segments : Segments
+        grid : GridSteps
+            Of the same segments.
+        state : (sources, n, n) array
+            Covariances of the states at the start, which become those at the end; the system's own without it.
+        steps : bool
+            Keep the transition matrix of every segment and what noise adds in it.
+
+        Returns
+        -------
+        SegmentResults
+            With errors of zero: no formula is embedded, who calls compares two grids.
+
+        Raises
+        ------
+        IntegrationError, DataError
+        """
+        system = self.system
+        k, n, s, r = segments.end.size, len(system.states), len(system.sources), len(system.outputs)
+        state = self._start(executable.parameters) if state is None else state
+        covariance, mean = np.empty((k, s, r, r)), np.empty((k, r))
+        transition = np.empty((k, n, n)) if steps else None
+        added = np.empty((k, s, n, n)) if steps else None
+        counters, failure = np.zeros(3), np.zeros(2)
+        arrays = (segments.end, segments.low, segments.high)
+        given = [k, *(np.ascontiguousarray(array, float) for array in arrays)]
+        given += [np.ascontiguousarray(grid.counts, np.intc), np.ascontiguousarray(grid.edges, float)]
+        given += [np.ascontiguousarray(array, float) for array in (executable.parameters, executable.tables)]
+        results = (state, np.zeros(n), covariance, mean, transition, added, counters, failure)
+        code = self.shared_library.call("sweep_on_grid", *given, *results)
+        self._check(code, failure, executable, 0.0)
+        return SegmentResults(covariance, mean, np.zeros((k, s, r)), transition, added, _named(counters))
 
     def integrate(
         self,
@@ -147,6 +205,10 @@ class CompiledSweep:
             )
         if code == TOO_MANY_STEPS:
             raise StepBudgetError(MOST_STEPS, f"t = {time:.6g} s", time=time)
+        if code == NEARLY_SINGULAR:
+            raise IntegrationError(
+                f"the equations of a step near t = {time:g} s are nearly singular; take smaller steps"
+            )
         if code == OUT_OF_RANGE:
             raise IntegrationError(
                 f"the responses leave the range of numbers near t = {time:g} s; the system grows without bound there "

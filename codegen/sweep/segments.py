@@ -27,6 +27,32 @@ class Segments:
 
 
 @dataclass(frozen=True, eq=False)
+class GridSteps:
+    """Steps of consecutive segments.
+
+    Attributes
+    ----------
+    counts : (k,) array of int
+        In each segment, one or more.
+    edges : (sum of counts + 1,) array
+        s, from the start of the first segment to the end of the last.
+    """
+
+    counts: NDArray[np.intc]
+    edges: NDArray[np.float64]
+
+    @staticmethod
+    def equal(segments: Segments, counts: NDArray[np.intc]) -> GridSteps:
+        """Divide every segment into equal steps."""
+        begin = np.concatenate([[segments.start], segments.end[:-1]])
+        number = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts) + 1
+        length = np.repeat((segments.end - begin) / counts, counts)
+        edges = np.concatenate([[segments.start], np.repeat(begin, counts) + number * length])
+        edges[np.cumsum(counts)] = segments.end
+        return GridSteps(np.asarray(counts, np.intc), edges)
+
+
+@dataclass(frozen=True, eq=False)
 class SegmentResults:
     """What the compiled sweep returns at the end of every segment.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import groupby
 
 import casadi as ca
 
@@ -13,7 +14,8 @@ from ..system.table_layout import table_layout
 from ..toolchain.c_printer import c_function, c_statements, enumerators
 from ..toolchain.fingerprint import fingerprint
 from ..toolchain.templates import render
-from .kinds import Kind, kinds, spans
+from .kinds import Kind, Span, kinds, spans
+from .on_grid import TEMPLATE, grid_arguments
 from .runge_kutta import DOP853, RungeKutta
 
 LANES = 8  # columns side by side: one 512-bit register, two of 256 bits
@@ -49,12 +51,20 @@ def sweep_functions(system: LinearSystem) -> SweepFunctions:
 
 def sweep_fingerprint(system: LinearSystem, functions: SweepFunctions) -> str:
     """Return a hash of all that ``sweep_source`` writes from."""
-    files = ("sweep/source.py", "sweep/kinds.py", "sweep/runge_kutta.py", "templates/sweep.c.jinja")
+    files = (
+        *("sweep/source.py", "sweep/kinds.py", "sweep/runge_kutta.py", "templates/sweep.c.jinja"),
+        *("sweep/on_grid.py", "sweep/gauss_legendre.py", "nodes/elimination.py", f"templates/{TEMPLATE}"),
+    )
     return fingerprint(system, (functions.stage, functions.output), files)
 
 
-def sweep_source(system: LinearSystem, functions: SweepFunctions, formula: RungeKutta = DOP853) -> str:
-    """Return the C source of the sweep of a system: structure only, numbers are read at run time."""
+def sweep_source(
+    system: LinearSystem, functions: SweepFunctions, formula: RungeKutta = DOP853, with_grid: bool = False
+) -> str:
+    """Return the C source of the sweep of a system: structure only, numbers are read at run time.
+
+    ``with_grid`` adds the sweep on a given grid, where the system's structure is sparse enough for it.
+    """
     names = {
         "v": enumerators("V", [name for g in system.tables for name in g.names]),
         "p": enumerators("P", system.parameter_names),
@@ -69,8 +79,8 @@ def sweep_source(system: LinearSystem, functions: SweepFunctions, formula: Runge
     by_noise = _entries(B, by_row=False)
     columns = [by_noise[i] for i, _ in noises]
     reached = [spans(of, (row for _, row in column), LANES) for column in columns]
-    return render(
-        "sweep.c.jinja",
+    kind_values = [_kind(kind, A, columns, known.row()) for kind in of]
+    values = dict(
         title=f"{system.name}: all end times in one pass",
         structure=system.structure,
         system=system,
@@ -80,14 +90,17 @@ def sweep_source(system: LinearSystem, functions: SweepFunctions, formula: Runge
         lanes=LANES,
         most_steps=MOST_STEPS,
         blocks=sum(kind.blocks for kind in of),
-        kinds=[_kind(kind, A, columns, known.row()) for kind in of],
+        kinds=kind_values,
         first_of_kind=[kind.first * LANES for kind in of for _ in range(kind.blocks)],
         most_rows=max(len(kind.rows) for kind in of),
         place=place,
         own_row=own_row,
         reaches=[(i, *span) for i, found in enumerate(reached) for span in found],
         products=[
-            (i, *rows, *over) for i, found in enumerate(reached) for k, rows in enumerate(found) for over in found[k:]
+            (first, count, *rows, *over)
+            for first, count in _alike([k for _, k in noises], reached)
+            for k, rows in enumerate(reached[first])
+            for over in reached[first][k:]
         ],
         nonzeros={"A": A.nnz(), "B": B.nnz(), "known": known.nnz(), "C": C.nnz()},
         stage_statements=c_statements(
@@ -102,6 +115,18 @@ def sweep_source(system: LinearSystem, functions: SweepFunctions, formula: Runge
         formula=formula,
         weighted=weighted,
     )
+    source = render("sweep.c.jinja", **values)
+    more = grid_arguments(of, kind_values, A, LANES) if with_grid else None
+    return source if more is None else source + render(TEMPLATE, **values, **more)
+
+
+def _alike(sources: list[int], reached: list[list[Span]]) -> list[tuple[int, int]]:
+    """Return first and number of consecutive noises of one source that reach the same columns."""
+    found: list[tuple[int, int]] = []
+    for _, noises in groupby(range(len(sources)), key=lambda i: (sources[i], reached[i])):
+        of = list(noises)
+        found.append((of[0], len(of)))
+    return found
 
 
 def _places(of: Sequence[Kind], states: int) -> tuple[list[int], list[int]]:

@@ -40,7 +40,7 @@
 enum {
   STATES = 31, LANES = 8, BLOCKS = 4, COLUMNS = BLOCKS * LANES, ROWS = 31, /* most of a block */
   STAGES = 12, NODES = 8, /* stages whose weight is not zero */
-  SOURCES = 3, NOISES = 4, RESPONSES = 8,
+  SOURCES = 3, NOISES = 4, RESPONSES = 8, WIDE = 8, /* responses, in whole registers */
   HORIZON = 5, /* segments over which effects are followed to weigh errors */
   TABLE_VALUES = 90, GROUPS = 3
 };
@@ -2924,29 +2924,33 @@ static void add_quadrature_errors(const double h, const double (*restrict gain)[
   }
 }
 
-/* Noise, and the rows and columns of W that it adds to: upper blocks */
-enum { PRODUCTS = 4 };
-static const int product[4][5] = { { 0, 0, 32, 0, 32 }, { 1, 0, 32, 0, 32 }, { 2, 0, 32, 0, 32 }, { 3, 0, 32, 0, 32 } };
+/* First and number of noises of one source that reach the same columns, and the rows and columns of W that they add to:
+ * upper blocks */
+enum { PRODUCTS = 3 };
+static const int product[3][6] = { { 0, 2, 0, 32, 0, 32 }, { 2, 1, 0, 32, 0, 32 }, { 3, 1, 0, 32, 0, 32 } };
 
-/* Add one step's integral of g g' to the upper blocks of W, two rows at a time. */
-static void add_products(const double (*restrict g)[COLUMNS], const double h, double (*restrict W)[COLUMNS],
+/* Add one step's integral of g g' of some noises to the upper blocks of W, two rows at a time, so that these stay near. */
+static void add_products(const double (*restrict noise)[NODES][COLUMNS], const double h, double (*restrict W)[COLUMNS],
                          const int *restrict of) {
-  int r, c, j;
-  for (r = of[1]; r < of[2]; r += 2) {
+  int r, c, j, n;
+  for (r = of[2]; r < of[3]; r += 2) {
     double *restrict first = W[r], *restrict second = W[r + 1];
-    const double a0 = h * node_weight[0] * g[0][r], b0 = h * node_weight[0] * g[0][r + 1];
-    const double a1 = h * node_weight[1] * g[1][r], b1 = h * node_weight[1] * g[1][r + 1];
-    const double a2 = h * node_weight[2] * g[2][r], b2 = h * node_weight[2] * g[2][r + 1];
-    const double a3 = h * node_weight[3] * g[3][r], b3 = h * node_weight[3] * g[3][r + 1];
-    const double a4 = h * node_weight[4] * g[4][r], b4 = h * node_weight[4] * g[4][r + 1];
-    const double a5 = h * node_weight[5] * g[5][r], b5 = h * node_weight[5] * g[5][r + 1];
-    const double a6 = h * node_weight[6] * g[6][r], b6 = h * node_weight[6] * g[6][r + 1];
-    const double a7 = h * node_weight[7] * g[7][r], b7 = h * node_weight[7] * g[7][r + 1];
-    for (c = of[3] > r / LANES * LANES ? of[3] : r / LANES * LANES; c < of[4]; c += LANES)
-      for (j = c; j < c + LANES; ++j) {
-        first[j] += a0 * g[0][j] + a1 * g[1][j] + a2 * g[2][j] + a3 * g[3][j] + a4 * g[4][j] + a5 * g[5][j] + a6 * g[6][j] + a7 * g[7][j];
-        second[j] += b0 * g[0][j] + b1 * g[1][j] + b2 * g[2][j] + b3 * g[3][j] + b4 * g[4][j] + b5 * g[5][j] + b6 * g[6][j] + b7 * g[7][j];
-      }
+    for (n = of[0]; n < of[0] + of[1]; ++n) {
+      const double (*restrict g)[COLUMNS] = noise[n];
+      const double a0 = h * node_weight[0] * g[0][r], b0 = h * node_weight[0] * g[0][r + 1];
+      const double a1 = h * node_weight[1] * g[1][r], b1 = h * node_weight[1] * g[1][r + 1];
+      const double a2 = h * node_weight[2] * g[2][r], b2 = h * node_weight[2] * g[2][r + 1];
+      const double a3 = h * node_weight[3] * g[3][r], b3 = h * node_weight[3] * g[3][r + 1];
+      const double a4 = h * node_weight[4] * g[4][r], b4 = h * node_weight[4] * g[4][r + 1];
+      const double a5 = h * node_weight[5] * g[5][r], b5 = h * node_weight[5] * g[5][r + 1];
+      const double a6 = h * node_weight[6] * g[6][r], b6 = h * node_weight[6] * g[6][r + 1];
+      const double a7 = h * node_weight[7] * g[7][r], b7 = h * node_weight[7] * g[7][r + 1];
+      for (c = of[4] > r / LANES * LANES ? of[4] : r / LANES * LANES; c < of[5]; c += LANES)
+        for (j = c; j < c + LANES; ++j) {
+          first[j] += a0 * g[0][j] + a1 * g[1][j] + a2 * g[2][j] + a3 * g[3][j] + a4 * g[4][j] + a5 * g[5][j] + a6 * g[6][j] + a7 * g[7][j];
+          second[j] += b0 * g[0][j] + b1 * g[1][j] + b2 * g[2][j] + b3 * g[3][j] + b4 * g[4][j] + b5 * g[5][j] + b6 * g[6][j] + b7 * g[7][j];
+        }
+    }
   }
 }
 
@@ -3024,7 +3028,7 @@ static int sweep_segment(Flight *f, double begin, double end, double tolerance, 
     t = pieces > 1.0 ? t - h : begin;
     memcpy(x, s.next, sizeof x);
     for (i = 0; i < PRODUCTS; ++i)
-      add_products((const double (*)[COLUMNS])s.noise[product[i][0]], h, g->W[noise_source[product[i][0]]], product[i]);
+      add_products((const double (*)[NODES][COLUMNS])s.noise, h, g->W[noise_source[product[i][0]]], product[i]);
     for (j = 0; j < COLUMNS; ++j) {
       for (i = 0; i < NODES; ++i) g->z[j] += h * node_weight[i] * s.known[i][j];
       g->error[j] += s.remaining[j];
@@ -3040,51 +3044,52 @@ static int sweep_segment(Flight *f, double begin, double end, double tolerance, 
 
 /* ---- Forward over a segment ---- */
 
-/* result = factor' from, over the rows of a kind, `width` columns from its first on */
-static void multiply_own_0(const double (*restrict factor)[COLUMNS], const int count,
-                          const double (*restrict from)[32], double (*restrict result)[COLUMNS]) {
-  int i, k, c;
-  for (i = 0; i < count; ++i) {
-    double sum[32] = { 0.0 };
-    for (k = 0; k < 31; ++k)
-      for (c = 0; c < 32; ++c) sum[c] += factor[k][i] * from[k][c];
-    for (c = 0; c < 32; ++c) result[i][0 + c] = sum[c];
-  }
+/* Add factor' from to result, four rows and 32 columns at a time */
+static void multiply(const double *restrict factor, const int stride, const int rows, const int inner,
+                     const double (*restrict from)[COLUMNS], const int columns, double (*restrict result)[COLUMNS]) {
+  int i, k, c, j;
+  for (i = 0; i < rows; i += 4)
+    for (c = 0; c < columns; ) {
+      if (columns - c >= 4 * LANES) {
+        double sum[4][4 * LANES] = { { 0.0 } };
+        for (k = 0; k < inner; ++k)
+          for (j = 0; j < 4 * LANES; ++j) {
+            sum[0][j] += factor[k * stride + i] * from[k][c + j];
+            sum[1][j] += factor[k * stride + i + 1] * from[k][c + j];
+            sum[2][j] += factor[k * stride + i + 2] * from[k][c + j];
+            sum[3][j] += factor[k * stride + i + 3] * from[k][c + j];
+          }
+        for (k = 0; k < 4; ++k) memcpy(result[i + k] + c, sum[k], sizeof sum[k]);
+        c += 4 * LANES;
+      } else {
+        double sum[4][LANES] = { { 0.0 } };
+        for (k = 0; k < inner; ++k)
+          for (j = 0; j < LANES; ++j) {
+            sum[0][j] += factor[k * stride + i] * from[k][c + j];
+            sum[1][j] += factor[k * stride + i + 1] * from[k][c + j];
+            sum[2][j] += factor[k * stride + i + 2] * from[k][c + j];
+            sum[3][j] += factor[k * stride + i + 3] * from[k][c + j];
+          }
+        for (k = 0; k < 4; ++k) memcpy(result[i + k] + c, sum[k], sizeof sum[k]);
+        c += LANES;
+      }
+    }
 }
 
-/* result = factor' from, over the rows of a kind, `width` columns from its first on */
-static void multiply_upper_0(const double (*restrict factor)[COLUMNS], const int count,
-                          const double (*restrict from)[32], double (*restrict result)[COLUMNS]) {
-  int i, k, c;
-  for (i = 0; i < count; ++i) {
-    double sum[32] = { 0.0 };
-    for (k = 0; k < 31; ++k)
-      for (c = 0; c < 32; ++c) sum[c] += factor[k][i] * from[k][c];
-    for (c = 0; c < 32; ++c) result[i][0 + c] = sum[c];
-  }
-}
-
-/* inherited = Phi P Phi', both over states; P is symmetric. What is multiplied is gathered before. */
-static void carry(const Segment *restrict g, const double *restrict P, double (*restrict inherited)[STATES]) {
-  double factor[ROWS][COLUMNS] = { { 0.0 } }, right[STATES][COLUMNS], result[COLUMNS][COLUMNS];
+/* inherited = Phi P Phi', all in the order of columns; P is symmetric. What is multiplied is gathered before. */
+static void carry(const Segment *restrict g, const double (*restrict P)[COLUMNS], double (*restrict inherited)[COLUMNS]) {
+  double factor[ROWS][COLUMNS], from[ROWS][COLUMNS], right[COLUMNS][COLUMNS];
   int i;
-  {
-    double phi[31][32];
-    for (i = 0; i < 31; ++i) {
-      memcpy(factor[i], P + row_0[i] * STATES, STATES * sizeof(double));
-      memcpy(phi[i], g->transposed[row_0[i]] + 0, sizeof phi[i]);
-    }
-    multiply_own_0((const double (*)[COLUMNS])factor, STATES, (const double (*)[32])phi, right);
+  for (i = 0; i < 31; ++i) {
+    memcpy(factor[i], P[i], sizeof factor[i]);
+    memcpy(from[i], g->transposed[row_0[i]] + 0 * LANES, 4 * LANES * sizeof(double));
   }
-  {
-    double from[31][32];
-    for (i = 0; i < 31; ++i) {
-      memcpy(factor[i], g->transposed[row_0[i]] + 0, 4 * LANES * sizeof(double));
-      memcpy(from[i], right[row_0[i]] + 0, sizeof from[i]);
-    }
-    multiply_upper_0((const double (*)[COLUMNS])factor, 31, (const double (*)[32])from, result + 0);
+  multiply(factor[0], COLUMNS, COLUMNS, 31, (const double (*)[COLUMNS])from, 4 * LANES, (double (*)[COLUMNS])(right[0] + 0 * LANES));
+  for (i = 0; i < 31; ++i) {
+    memcpy(factor[i], g->transposed[row_0[i]] + 0 * LANES, 4 * LANES * sizeof(double));
+    memcpy(from[i], right[i] + 0 * LANES, (BLOCKS - 0) * LANES * sizeof(double));
   }
-  for (i = 0; i < STATES; ++i) memcpy(inherited[i], result[i], STATES * sizeof(double));
+  multiply(factor[0], COLUMNS, 4 * LANES, 31, (const double (*)[COLUMNS])from, (BLOCKS - 0) * LANES, (double (*)[COLUMNS])(inherited[0 * LANES] + 0 * LANES));
 }
 
 /* Weigh the errors of the adjoint of state r by typical sizes alone. */
@@ -3102,36 +3107,126 @@ static void weigh_by_size(const double *size, int r, Weights *w) {
  * ones). A hundredth of the weight that would keep every single state accurate is the least. w->gain: the second
  * factor alone, last that of the mean, against the largest of the sources and itself. What is smaller than SMALLEST of
  * its typical size is not resolved. */
-static void weigh(const double *C, const Segment *restrict g, const double *P, const double *covariance,
+static void weigh(const double *C, const Segment *restrict g, const double (*P)[COLUMNS][COLUMNS], const double *covariance,
                   const double *m, const double *mean, const double *typical, Weights *w) {
-  static const double unit[RESPONSES] = { 0.0 };
-  double effect[HORIZON * RESPONSES][COLUMNS], column[STATES], y[RESPONSES], size[STATES], by_column[COLUMNS] = { 0.0 };
-  double phi[COLUMNS][COLUMNS], all[STATES + RESPONSES];
+  double effect[HORIZON * WIDE][COLUMNS], transposed[COLUMNS][HORIZON * WIDE], most[HORIZON * WIDE];
+  double before[COLUMNS][WIDE], phi[COLUMNS][COLUMNS], part[WIDE][COLUMNS], size[STATES];
+  double by_column[COLUMNS] = { 0.0 }, all[STATES + RESPONSES];
   int s, b, i, j, r;
   memset(effect, 0, sizeof effect);
   memset(phi, 0, sizeof phi);
   memset(w, 0, sizeof *w);
-  memset(column, 0, sizeof column);
-  for (r = 0; r < STATES; ++r) {
-    column[r] = 1.0;
-    respond(C, unit, column, y);
-    for (i = 0; i < RESPONSES; ++i) effect[i][r] = y[i];
-    column[r] = 0.0;
-  }
-  for (r = 0; r < COLUMNS; ++r)
-    for (j = 0; j < STATES; ++j) phi[r][j] = g->transposed[j][r];
-  for (i = RESPONSES; i < HORIZON * RESPONSES; ++i) {
-    double sum[COLUMNS] = { 0.0 };
+  effect[0][0] = C[0];
+  effect[0][1] = C[6];
+  effect[0][12] = C[12];
+  effect[0][14] = C[17];
+  effect[0][15] = C[22];
+  effect[0][16] = C[27];
+  effect[0][17] = C[31];
+  effect[0][18] = C[35];
+  effect[0][19] = C[39];
+  effect[0][20] = C[43];
+  effect[0][21] = C[47];
+  effect[0][22] = C[51];
+  effect[0][23] = C[55];
+  effect[0][24] = C[59];
+  effect[0][25] = C[63];
+  effect[0][26] = C[67];
+  effect[0][27] = C[73];
+  effect[0][28] = C[79];
+  effect[0][29] = C[85];
+  effect[0][30] = C[90];
+  effect[1][0] = C[1];
+  effect[1][1] = C[7];
+  effect[1][26] = C[68];
+  effect[1][27] = C[74];
+  effect[1][28] = C[80];
+  effect[2][12] = C[13];
+  effect[2][14] = C[18];
+  effect[2][15] = C[23];
+  effect[3][0] = C[2];
+  effect[3][1] = C[8];
+  effect[3][12] = C[14];
+  effect[3][14] = C[19];
+  effect[3][15] = C[24];
+  effect[3][16] = C[28];
+  effect[3][17] = C[32];
+  effect[3][18] = C[36];
+  effect[3][19] = C[40];
+  effect[3][20] = C[44];
+  effect[3][21] = C[48];
+  effect[3][22] = C[52];
+  effect[3][23] = C[56];
+  effect[3][24] = C[60];
+  effect[3][25] = C[64];
+  effect[3][26] = C[69];
+  effect[3][27] = C[75];
+  effect[3][28] = C[81];
+  effect[3][29] = C[86];
+  effect[3][30] = C[91];
+  effect[4][29] = C[87];
+  effect[5][0] = C[3];
+  effect[5][1] = C[9];
+  effect[5][12] = C[15];
+  effect[5][14] = C[20];
+  effect[5][15] = C[25];
+  effect[5][16] = C[29];
+  effect[5][17] = C[33];
+  effect[5][18] = C[37];
+  effect[5][19] = C[41];
+  effect[5][20] = C[45];
+  effect[5][21] = C[49];
+  effect[5][22] = C[53];
+  effect[5][23] = C[57];
+  effect[5][24] = C[61];
+  effect[5][25] = C[65];
+  effect[5][26] = C[70];
+  effect[5][27] = C[76];
+  effect[5][28] = C[82];
+  effect[5][29] = C[88];
+  effect[5][30] = C[92];
+  effect[6][0] = C[4];
+  effect[6][1] = C[10];
+  effect[6][12] = C[16];
+  effect[6][14] = C[21];
+  effect[6][15] = C[26];
+  effect[6][16] = C[30];
+  effect[6][17] = C[34];
+  effect[6][18] = C[38];
+  effect[6][19] = C[42];
+  effect[6][20] = C[46];
+  effect[6][21] = C[50];
+  effect[6][22] = C[54];
+  effect[6][23] = C[58];
+  effect[6][24] = C[62];
+  effect[6][25] = C[66];
+  effect[6][26] = C[71];
+  effect[6][27] = C[77];
+  effect[6][28] = C[83];
+  effect[6][29] = C[89];
+  effect[6][30] = C[93];
+  effect[7][0] = C[5];
+  effect[7][1] = C[11];
+  effect[7][26] = C[72];
+  effect[7][27] = C[78];
+  effect[7][28] = C[84];
+  for (r = 0; r < 31; ++r)
+    for (j = 0 * LANES; j < 4 * LANES; ++j) phi[j][r] = g->transposed[row_0[r]][j];
+  for (i = WIDE; i < HORIZON * WIDE; i += WIDE) {
     for (r = 0; r < COLUMNS; ++r)
-      for (j = 0; j < COLUMNS; ++j) sum[j] += effect[i - RESPONSES][r] * phi[r][j];
-    for (j = 0; j < COLUMNS; ++j) effect[i][j] = sum[j];
+      for (j = 0; j < WIDE; ++j) before[r][j] = effect[i - WIDE + j][r];
+    multiply(before[0 * LANES], WIDE, WIDE, 4 * LANES, (const double (*)[COLUMNS])(phi + 0 * LANES), 32, part);
+    for (j = 0; j < WIDE; ++j)
+      for (r = 0; r < 31; ++r) effect[i + j][r] += part[j][r];
   }
+  for (i = 0; i < HORIZON * WIDE; ++i)
+    for (r = 0; r < COLUMNS; ++r) transposed[r][i] = effect[i][r] = fabs(effect[i][r]);
   for (r = 0; r < STATES; ++r) all[r] = fabs(m[r]);
   for (i = 0; i < RESPONSES; ++i) all[STATES + i] = fabs(mean[i]);
   for (s = 0; s <= SOURCES; ++s) {
     double *factor = w->gain[s], deviation[RESPONSES];
     for (r = 0; r < STATES; ++r) {
-      const double variance = s < SOURCES ? P[(s * STATES + r) * STATES + r] : all[r] * all[r];
+      const double variance = s < SOURCES ? P[s][r][r] : all[r] * all[r];
       by_column[r] = size[r] = variance > 0.0 ? sqrt(variance) : 0.0;
       all[r] = larger(all[r], size[r]);
       factor[r] = size[r] > 0.0 ? 0.01 / larger(size[r], SMALLEST * typical[r]) : 0.0;
@@ -3141,23 +3236,17 @@ static void weigh(const double *C, const Segment *restrict g, const double *P, c
       deviation[i] = variance > 0.0 ? sqrt(variance) : 0.0;
       all[STATES + i] = larger(all[STATES + i], deviation[i]);
     }
-    for (i = 0; i < HORIZON * RESPONSES; ++i) {
-      const double least = SMALLEST * typical[STATES + i % RESPONSES];
-      double now = 0.0, then = 0.0, inverse;
-      double nows[LANES] = { 0.0 }, thens[LANES] = { 0.0 };
-      for (r = 0; r < COLUMNS; r += LANES)
-        for (j = 0; j < LANES; ++j) {
-          nows[j] = larger(nows[j], fabs(effect[i % RESPONSES][r + j]) * by_column[r + j]);
-          thens[j] = larger(thens[j], fabs(effect[i][r + j]) * by_column[r + j]);
-        }
-      for (j = 0; j < LANES; ++j) {
-        now = larger(now, nows[j]);
-        then = larger(then, thens[j]);
-      }
+    for (i = 0; i < HORIZON * WIDE; ++i) most[i] = 0.0;
+    for (r = 0; r < COLUMNS; ++r)
+      for (i = 0; i < HORIZON * WIDE; ++i) most[i] = larger(most[i], transposed[r][i] * by_column[r]);
+    for (i = 0; i < HORIZON * WIDE; ++i) {
+      const int response = i % WIDE;
+      double inverse;
+      if (response >= RESPONSES) continue;
       /* where a system grows, so does the response that errors are held against */
-      inverse = deviation[i % RESPONSES] > 0.0 ? 1.0 / larger(deviation[i % RESPONSES], least) : 0.0;
-      if (then > now) inverse *= now / then;
-      for (r = 0; r < COLUMNS; ++r) factor[r] = larger(factor[r], fabs(effect[i][r]) * inverse);
+      inverse = deviation[response] > 0.0 ? 1.0 / larger(deviation[response], SMALLEST * typical[STATES + response]) : 0.0;
+      if (most[i] > most[response]) inverse *= most[response] / most[i];
+      for (r = 0; r < COLUMNS; ++r) factor[r] = larger(factor[r], effect[i][r] * inverse);
     }
     for (b = 0; b < 4 && s < SOURCES; ++b)
       for (j = 0; j < 31; ++j)
@@ -3166,10 +3255,10 @@ static void weigh(const double *C, const Segment *restrict g, const double *P, c
   }
   /* what no noise reaches is weighed by typical sizes, for the mean */
   for (r = 0; r < STATES; ++r) {
-    double most = 0.0, felt = 0.0;
-    for (s = 0; s < SOURCES; ++s) most = larger(most, w->gain[s][r]);
-    for (i = 0; i < HORIZON * RESPONSES; ++i) felt = larger(felt, fabs(effect[i][r]));
-    if (most == 0.0 && felt > 0.0) {
+    double gained = 0.0, felt = 0.0;
+    for (s = 0; s < SOURCES; ++s) gained = larger(gained, w->gain[s][r]);
+    for (i = 0; i < HORIZON * WIDE; ++i) felt = larger(felt, effect[i][r]);
+    if (gained == 0.0 && felt > 0.0) {
       const double own = w->gain[SOURCES][r];
       weigh_by_size(typical, r, w);
       if (own > 0.0) w->gain[SOURCES][r] = own;
@@ -3186,31 +3275,47 @@ static void carry_mean(const Segment *restrict g, const double *restrict m, doub
   }
 }
 
-static void covariance_of(const double *C, const double *P, double *result) {
-  static const double none[RESPONSES] = { 0.0 };
-  double half[STATES][RESPONSES];
-  double column[STATES];
-  int i, r;
-  for (i = 0; i < STATES; ++i) respond(C, none, P + i * STATES, half[i]);
-  for (r = 0; r < RESPONSES; ++r) {
-    for (i = 0; i < STATES; ++i) column[i] = half[i][r];
-    respond(C, none, column, result + r * RESPONSES);
+/* C P C'; P in the order of columns */
+static void covariance_of(const double *C, const double (*restrict P)[COLUMNS], double *result) {
+  double half[RESPONSES][COLUMNS];
+  int c, r;
+  for (c = 0; c < COLUMNS; ++c) {
+    half[0][c] = C[0] * P[0][c] + C[6] * P[1][c] + C[12] * P[12][c] + C[17] * P[14][c] + C[22] * P[15][c] + C[27] * P[16][c] + C[31] * P[17][c] + C[35] * P[18][c] + C[39] * P[19][c] + C[43] * P[20][c] + C[47] * P[21][c] + C[51] * P[22][c] + C[55] * P[23][c] + C[59] * P[24][c] + C[63] * P[25][c] + C[67] * P[26][c] + C[73] * P[27][c] + C[79] * P[28][c] + C[85] * P[29][c] + C[90] * P[30][c];
+    half[1][c] = C[1] * P[0][c] + C[7] * P[1][c] + C[68] * P[26][c] + C[74] * P[27][c] + C[80] * P[28][c];
+    half[2][c] = C[13] * P[12][c] + C[18] * P[14][c] + C[23] * P[15][c];
+    half[3][c] = C[2] * P[0][c] + C[8] * P[1][c] + C[14] * P[12][c] + C[19] * P[14][c] + C[24] * P[15][c] + C[28] * P[16][c] + C[32] * P[17][c] + C[36] * P[18][c] + C[40] * P[19][c] + C[44] * P[20][c] + C[48] * P[21][c] + C[52] * P[22][c] + C[56] * P[23][c] + C[60] * P[24][c] + C[64] * P[25][c] + C[69] * P[26][c] + C[75] * P[27][c] + C[81] * P[28][c] + C[86] * P[29][c] + C[91] * P[30][c];
+    half[4][c] = C[87] * P[29][c];
+    half[5][c] = C[3] * P[0][c] + C[9] * P[1][c] + C[15] * P[12][c] + C[20] * P[14][c] + C[25] * P[15][c] + C[29] * P[16][c] + C[33] * P[17][c] + C[37] * P[18][c] + C[41] * P[19][c] + C[45] * P[20][c] + C[49] * P[21][c] + C[53] * P[22][c] + C[57] * P[23][c] + C[61] * P[24][c] + C[65] * P[25][c] + C[70] * P[26][c] + C[76] * P[27][c] + C[82] * P[28][c] + C[88] * P[29][c] + C[92] * P[30][c];
+    half[6][c] = C[4] * P[0][c] + C[10] * P[1][c] + C[16] * P[12][c] + C[21] * P[14][c] + C[26] * P[15][c] + C[30] * P[16][c] + C[34] * P[17][c] + C[38] * P[18][c] + C[42] * P[19][c] + C[46] * P[20][c] + C[50] * P[21][c] + C[54] * P[22][c] + C[58] * P[23][c] + C[62] * P[24][c] + C[66] * P[25][c] + C[71] * P[26][c] + C[77] * P[27][c] + C[83] * P[28][c] + C[89] * P[29][c] + C[93] * P[30][c];
+    half[7][c] = C[5] * P[0][c] + C[11] * P[1][c] + C[72] * P[26][c] + C[78] * P[27][c] + C[84] * P[28][c];
   }
+  for (r = 0; r < RESPONSES; ++r, result += RESPONSES) {
+    const double *restrict of = half[r];
+    result[0] = C[0] * of[0] + C[6] * of[1] + C[12] * of[12] + C[17] * of[14] + C[22] * of[15] + C[27] * of[16] + C[31] * of[17] + C[35] * of[18] + C[39] * of[19] + C[43] * of[20] + C[47] * of[21] + C[51] * of[22] + C[55] * of[23] + C[59] * of[24] + C[63] * of[25] + C[67] * of[26] + C[73] * of[27] + C[79] * of[28] + C[85] * of[29] + C[90] * of[30];
+    result[1] = C[1] * of[0] + C[7] * of[1] + C[68] * of[26] + C[74] * of[27] + C[80] * of[28];
+    result[2] = C[13] * of[12] + C[18] * of[14] + C[23] * of[15];
+    result[3] = C[2] * of[0] + C[8] * of[1] + C[14] * of[12] + C[19] * of[14] + C[24] * of[15] + C[28] * of[16] + C[32] * of[17] + C[36] * of[18] + C[40] * of[19] + C[44] * of[20] + C[48] * of[21] + C[52] * of[22] + C[56] * of[23] + C[60] * of[24] + C[64] * of[25] + C[69] * of[26] + C[75] * of[27] + C[81] * of[28] + C[86] * of[29] + C[91] * of[30];
+    result[4] = C[87] * of[29];
+    result[5] = C[3] * of[0] + C[9] * of[1] + C[15] * of[12] + C[20] * of[14] + C[25] * of[15] + C[29] * of[16] + C[33] * of[17] + C[37] * of[18] + C[41] * of[19] + C[45] * of[20] + C[49] * of[21] + C[53] * of[22] + C[57] * of[23] + C[61] * of[24] + C[65] * of[25] + C[70] * of[26] + C[76] * of[27] + C[82] * of[28] + C[88] * of[29] + C[92] * of[30];
+    result[6] = C[4] * of[0] + C[10] * of[1] + C[16] * of[12] + C[21] * of[14] + C[26] * of[15] + C[30] * of[16] + C[34] * of[17] + C[38] * of[18] + C[42] * of[19] + C[46] * of[20] + C[50] * of[21] + C[54] * of[22] + C[58] * of[23] + C[62] * of[24] + C[66] * of[25] + C[71] * of[26] + C[77] * of[27] + C[83] * of[28] + C[89] * of[29] + C[93] * of[30];
+    result[7] = C[5] * of[0] + C[11] * of[1] + C[72] * of[26] + C[78] * of[27] + C[84] * of[28];
+    (void)of;
+  }
+  (void)C; (void)P;
 }
 
 /* P_next = Phi P Phi' + W and the covariance of the responses, with the part of each variance that P brought */
-static void forward(const Segment *restrict g, const double *C, const double *P, double *P_next, double *covariance,
-                    double *inherited) {
-  double carried[STATES][STATES], part[RESPONSES * RESPONSES];
+static void forward(const Segment *restrict g, const double *C, const double (*restrict P)[COLUMNS][COLUMNS],
+                    double (*restrict P_next)[COLUMNS][COLUMNS], double *covariance, double *inherited) {
+  double part[RESPONSES * RESPONSES];
   int s, i, j;
   for (s = 0; s < SOURCES; ++s) {
-    double *next = P_next + s * STATES * STATES;
-    carry(g, P + s * STATES * STATES, carried);
-    covariance_of(C, &carried[0][0], part);
+    carry(g, P[s], P_next[s]);
+    covariance_of(C, (const double (*)[COLUMNS])P_next[s], part);
     for (i = 0; i < RESPONSES; ++i) inherited[s * RESPONSES + i] = part[i * RESPONSES + i];
-    for (i = 0; i < STATES; ++i)
-      for (j = 0; j < STATES; ++j) next[i * STATES + j] = carried[i][j] + g->W[s][i][j];
-    covariance_of(C, next, covariance + s * RESPONSES * RESPONSES);
+    for (i = 0; i < COLUMNS; ++i)
+      for (j = 0; j < COLUMNS; ++j) P_next[s][i][j] += g->W[s][i][j];
+    covariance_of(C, (const double (*)[COLUMNS])P_next[s], covariance + s * RESPONSES * RESPONSES);
   }
 }
 
@@ -3224,7 +3329,7 @@ static int asked_too_much(int code, const Counters *done) {
  * low, high      limits of table lookup in each segment
  * tolerance      of one step, relative to the size of the states
  * size           typical sizes of the states, used until covariances are known, then those of the responses
- * P, m           covariance of each source and mean at the start; at the end on return
+ * start_P, m     covariance of each source and mean at the start; at the end on return
  * covariance     (count, SOURCES, RESPONSES, RESPONSES)
  * mean           (count, RESPONSES)
  * estimate       (count, SOURCES, RESPONSES) relative error of the standard deviation
@@ -3234,10 +3339,10 @@ static int asked_too_much(int code, const Counters *done) {
  * failure        time, entry
  * stop           looked at in every step; not zero ends the call */
 EXPORT int sweep(int count, double start, const double *end, const double *low, const double *high, const double *p,
-                 const double *tables, double tolerance, const double *size, double *P, double *m, double *covariance,
+                 const double *tables, double tolerance, const double *size, double *start_P, double *m, double *covariance,
                  double *mean, double *estimate, double *transition, double *added, double *counters, double *failure,
                  const volatile int *stop) {
-  double C[C_SIZE], direct[RESPONSES], next[STATES], P_next[SOURCES_1 * STATES * STATES];
+  double C[C_SIZE], direct[RESPONSES], next[STATES], P[SOURCES_1][COLUMNS][COLUMNS], P_next[SOURCES_1][COLUMNS][COLUMNS];
   double inherited[SOURCES_1 * RESPONSES], largest[SOURCES_1], made = 0.0;
   Segment g;
   Weights weights;
@@ -3250,6 +3355,10 @@ EXPORT int sweep(int count, double start, const double *end, const double *low, 
   f.tables = tables;
   memset(f.piece, 0, sizeof f.piece);
   memset(largest, 0, sizeof largest);
+  memset(P, 0, sizeof P);
+  for (s = 0; s < SOURCES; ++s)
+    for (i = 0; i < STATES; ++i)
+      for (j = 0; j < STATES; ++j) P[s][i][j] = start_P[(s * STATES + i) * STATES + j];
   for (k = 0; k < count && code == DONE; ++k) {
     const double begin = k ? end[k - 1] : start, length = end[k] - begin;
     const int tried = length <= 10.0 * longest; /* else the weights know nothing of effects over such a time */
@@ -3279,15 +3388,15 @@ EXPORT int sweep(int count, double start, const double *end, const double *low, 
         unknown = asked_too_much(code, &done);
       }
       if (code != DONE) break;
-      forward(&g, C, P, P_next, result, inherited);
+      forward(&g, C, (const double (*)[COLUMNS][COLUMNS])P, P_next, result, inherited);
       carry_mean(&g, m, next);
       respond(C, direct, next, mean + k * RESPONSES);
-      weigh(C, &g, P_next, result, next, mean + k * RESPONSES, size, &weights);
+      weigh(C, &g, (const double (*)[COLUMNS][COLUMNS])P_next, result, next, mean + k * RESPONSES, size, &weights);
       code = sweep_segment(&f, begin, end[k], 0.1 * tolerance, MOST_STEPS, &weights, &step, &g, &done, &why, stop);
       if (code != DONE) break;
     }
-    forward(&g, C, P, P_next, result, inherited);
-    memcpy(P, P_next, SOURCES * STATES * STATES * sizeof(double));
+    forward(&g, C, (const double (*)[COLUMNS][COLUMNS])P, P_next, result, inherited);
+    memcpy(P, P_next, sizeof P);
     for (j = 0; j < COLUMNS; ++j) made = larger(j ? made : 0.0, g.error[j]);
     for (s = 0; s < SOURCES; ++s) {
       double worst = 0.0;
@@ -3313,9 +3422,12 @@ EXPORT int sweep(int count, double start, const double *end, const double *low, 
       for (s = 0; s < SOURCES; ++s)
         for (i = 0; i < STATES; ++i)
           for (j = 0; j < STATES; ++j) added[((k * SOURCES + s) * STATES + i) * STATES + j] = g.W[s][i][j];
-    if (length > 0.1 * longest) weigh(C, &g, P, result, m, mean + k * RESPONSES, size, &weights);
+    if (length > 0.1 * longest) weigh(C, &g, (const double (*)[COLUMNS][COLUMNS])P, result, m, mean + k * RESPONSES, size, &weights);
     longest = larger(longest, length);
   }
+  for (s = 0; s < SOURCES; ++s)
+    for (i = 0; i < STATES; ++i)
+      for (j = 0; j < STATES; ++j) start_P[(s * STATES + i) * STATES + j] = P[s][i][j];
   counters[0] = done.steps;
   counters[1] = done.rejected;
   counters[2] = done.evaluations;
@@ -3473,4 +3585,741 @@ EXPORT int mean_history(int count, double start, const double *end, const double
     respond(C, direct, x, outputs + (n + 1) * RESPONSES);
   }
   return DONE;
+}
+
+/* ---- The same segments on a given grid, by Gauss collocation with four stages, of order 8 ----
+ *
+ * Steps follow the slow, lightly damped roots alone: the formula is stable for every root that is, and keeps quadratic
+ * invariants, so that P = R P R' + sum h b_i g_i g_i' is itself the formula applied to the smooth covariance; the fast
+ * part of a column need not be accurate. Nothing is controlled here: who calls compares two grids.
+ *
+ * M = I - h (a x I) A of 8 steps is eliminated side by side, without exchanges, by the plan of codegen/nodes/elimination.py
+ * for the rows of a kind; then the adjoint goes back step by step: M' V = d a, a at the stages a' V / b, at the start of
+ * the step a + sum of V, because the d_i = (b a^-1)_i add up to nothing.
+ */
+
+#include <stdlib.h>
+
+enum { GAUSS = 4, SQUARE = GAUSS * GAUSS, SIDE = LANES, UNIT = -1 };
+enum { NEARLY_SINGULAR = TOO_MANY_STEPS + 1 };
+#define SINGULAR 1e-12
+
+static const double gauss_node[GAUSS] = { 0.06943184420297371, 0.33000947820757187, 0.6699905217924281, 0.9305681557970262 };
+static const double gauss_weight[GAUSS] = { 0.17392742256872679, 0.3260725774312732, 0.3260725774312732, 0.17392742256872679 };
+static const double gauss_end[GAUSS] = { -1.6407053217392273, 1.214393969798563, -1.214393969798571, 1.640705321739255 }; /* d */
+static const double gauss_matrix[SQUARE] = { 0.08696371128436346, 0.1881181174998681, 0.16719192197418864, 0.17748257225452202, -0.026604180084998798,
+  0.16303628871563655, 0.35395300603374436, 0.31344511474186953, 0.012627462689404725, -0.027880428602470902,
+  0.1630362887156362, 0.3526767575162709, -0.0035551496857956838, 0.0067355005945381585, -0.014190694931141033,
+  0.08696371128436373 }; /* a by columns */
+
+typedef double Eight __attribute__((vector_size(LANES * sizeof(double)))); /* of GCC and Clang */
+
+static inline Eight load_eight(const double *from) {
+  Eight x;
+  memcpy(&x, from, sizeof x);
+  return x;
+}
+
+static inline void store_eight(double *to, Eight x) { memcpy(to, &x, sizeof x); }
+
+#ifdef __clang__
+#define PICK(a, b, ...) __builtin_shufflevector(a, b, __VA_ARGS__)
+#else
+typedef long long Places __attribute__((vector_size(LANES * sizeof(long long))));
+#define PICK(a, b, ...) __builtin_shuffle(a, b, (Places){ __VA_ARGS__ })
+#endif
+
+/* to[j][i] = from[i][j], eight by eight; rows of `to` are `apart` numbers apart */
+static inline void transpose_eight(const Eight *restrict from, double *restrict to, const long apart) {
+  const Eight p0 = PICK(from[0], from[1], 0, 8, 2, 10, 4, 12, 6, 14), p1 = PICK(from[0], from[1], 1, 9, 3, 11, 5, 13, 7, 15);
+  const Eight p2 = PICK(from[2], from[3], 0, 8, 2, 10, 4, 12, 6, 14), p3 = PICK(from[2], from[3], 1, 9, 3, 11, 5, 13, 7, 15);
+  const Eight p4 = PICK(from[4], from[5], 0, 8, 2, 10, 4, 12, 6, 14), p5 = PICK(from[4], from[5], 1, 9, 3, 11, 5, 13, 7, 15);
+  const Eight p6 = PICK(from[6], from[7], 0, 8, 2, 10, 4, 12, 6, 14), p7 = PICK(from[6], from[7], 1, 9, 3, 11, 5, 13, 7, 15);
+  const Eight q0 = PICK(p0, p2, 0, 1, 8, 9, 4, 5, 12, 13), q2 = PICK(p0, p2, 2, 3, 10, 11, 6, 7, 14, 15);
+  const Eight q1 = PICK(p1, p3, 0, 1, 8, 9, 4, 5, 12, 13), q3 = PICK(p1, p3, 2, 3, 10, 11, 6, 7, 14, 15);
+  const Eight q4 = PICK(p4, p6, 0, 1, 8, 9, 4, 5, 12, 13), q6 = PICK(p4, p6, 2, 3, 10, 11, 6, 7, 14, 15);
+  const Eight q5 = PICK(p5, p7, 0, 1, 8, 9, 4, 5, 12, 13), q7 = PICK(p5, p7, 2, 3, 10, 11, 6, 7, 14, 15);
+  store_eight(to + 0 * apart, PICK(q0, q4, 0, 1, 2, 3, 8, 9, 10, 11));
+  store_eight(to + 4 * apart, PICK(q0, q4, 4, 5, 6, 7, 12, 13, 14, 15));
+  store_eight(to + 1 * apart, PICK(q1, q5, 0, 1, 2, 3, 8, 9, 10, 11));
+  store_eight(to + 5 * apart, PICK(q1, q5, 4, 5, 6, 7, 12, 13, 14, 15));
+  store_eight(to + 2 * apart, PICK(q2, q6, 0, 1, 2, 3, 8, 9, 10, 11));
+  store_eight(to + 6 * apart, PICK(q2, q6, 4, 5, 6, 7, 12, 13, 14, 15));
+  store_eight(to + 3 * apart, PICK(q3, q7, 0, 1, 2, 3, 8, 9, 10, 11));
+  store_eight(to + 7 * apart, PICK(q3, q7, 4, 5, 6, 7, 12, 13, 14, 15));
+}
+
+/* own = d x - sum of F' y over listed blocks, on the way down the pivots; 4 blocks of columns */
+static inline void down_4(const double *restrict F, const int *restrict block, const int *restrict state, const int first, const int last,
+                          const double *X, const int width, double *restrict x, double *own) {
+  int l;
+  Eight a0_0 = gauss_end[0] * load_eight(x + 0);
+  Eight a0_1 = gauss_end[0] * load_eight(x + 8);
+  Eight a0_2 = gauss_end[0] * load_eight(x + 16);
+  Eight a0_3 = gauss_end[0] * load_eight(x + 24);
+  Eight a1_0 = gauss_end[1] * load_eight(x + 0);
+  Eight a1_1 = gauss_end[1] * load_eight(x + 8);
+  Eight a1_2 = gauss_end[1] * load_eight(x + 16);
+  Eight a1_3 = gauss_end[1] * load_eight(x + 24);
+  Eight a2_0 = gauss_end[2] * load_eight(x + 0);
+  Eight a2_1 = gauss_end[2] * load_eight(x + 8);
+  Eight a2_2 = gauss_end[2] * load_eight(x + 16);
+  Eight a2_3 = gauss_end[2] * load_eight(x + 24);
+  Eight a3_0 = gauss_end[3] * load_eight(x + 0);
+  Eight a3_1 = gauss_end[3] * load_eight(x + 8);
+  Eight a3_2 = gauss_end[3] * load_eight(x + 16);
+  Eight a3_3 = gauss_end[3] * load_eight(x + 24);
+  for (l = first; l < last; ++l) {
+    const double *f = F + SQUARE * block[l], *y = X + GAUSS * width * state[l];
+    {
+      const Eight y0 = load_eight(y + 0 * width + 0);
+      const Eight y1 = load_eight(y + 0 * width + 8);
+      const Eight y2 = load_eight(y + 0 * width + 16);
+      const Eight y3 = load_eight(y + 0 * width + 24);
+      a0_0 -= f[0] * y0;
+      a0_1 -= f[0] * y1;
+      a0_2 -= f[0] * y2;
+      a0_3 -= f[0] * y3;
+      a1_0 -= f[4] * y0;
+      a1_1 -= f[4] * y1;
+      a1_2 -= f[4] * y2;
+      a1_3 -= f[4] * y3;
+      a2_0 -= f[8] * y0;
+      a2_1 -= f[8] * y1;
+      a2_2 -= f[8] * y2;
+      a2_3 -= f[8] * y3;
+      a3_0 -= f[12] * y0;
+      a3_1 -= f[12] * y1;
+      a3_2 -= f[12] * y2;
+      a3_3 -= f[12] * y3;
+    }
+    {
+      const Eight y0 = load_eight(y + 1 * width + 0);
+      const Eight y1 = load_eight(y + 1 * width + 8);
+      const Eight y2 = load_eight(y + 1 * width + 16);
+      const Eight y3 = load_eight(y + 1 * width + 24);
+      a0_0 -= f[1] * y0;
+      a0_1 -= f[1] * y1;
+      a0_2 -= f[1] * y2;
+      a0_3 -= f[1] * y3;
+      a1_0 -= f[5] * y0;
+      a1_1 -= f[5] * y1;
+      a1_2 -= f[5] * y2;
+      a1_3 -= f[5] * y3;
+      a2_0 -= f[9] * y0;
+      a2_1 -= f[9] * y1;
+      a2_2 -= f[9] * y2;
+      a2_3 -= f[9] * y3;
+      a3_0 -= f[13] * y0;
+      a3_1 -= f[13] * y1;
+      a3_2 -= f[13] * y2;
+      a3_3 -= f[13] * y3;
+    }
+    {
+      const Eight y0 = load_eight(y + 2 * width + 0);
+      const Eight y1 = load_eight(y + 2 * width + 8);
+      const Eight y2 = load_eight(y + 2 * width + 16);
+      const Eight y3 = load_eight(y + 2 * width + 24);
+      a0_0 -= f[2] * y0;
+      a0_1 -= f[2] * y1;
+      a0_2 -= f[2] * y2;
+      a0_3 -= f[2] * y3;
+      a1_0 -= f[6] * y0;
+      a1_1 -= f[6] * y1;
+      a1_2 -= f[6] * y2;
+      a1_3 -= f[6] * y3;
+      a2_0 -= f[10] * y0;
+      a2_1 -= f[10] * y1;
+      a2_2 -= f[10] * y2;
+      a2_3 -= f[10] * y3;
+      a3_0 -= f[14] * y0;
+      a3_1 -= f[14] * y1;
+      a3_2 -= f[14] * y2;
+      a3_3 -= f[14] * y3;
+    }
+    {
+      const Eight y0 = load_eight(y + 3 * width + 0);
+      const Eight y1 = load_eight(y + 3 * width + 8);
+      const Eight y2 = load_eight(y + 3 * width + 16);
+      const Eight y3 = load_eight(y + 3 * width + 24);
+      a0_0 -= f[3] * y0;
+      a0_1 -= f[3] * y1;
+      a0_2 -= f[3] * y2;
+      a0_3 -= f[3] * y3;
+      a1_0 -= f[7] * y0;
+      a1_1 -= f[7] * y1;
+      a1_2 -= f[7] * y2;
+      a1_3 -= f[7] * y3;
+      a2_0 -= f[11] * y0;
+      a2_1 -= f[11] * y1;
+      a2_2 -= f[11] * y2;
+      a2_3 -= f[11] * y3;
+      a3_0 -= f[15] * y0;
+      a3_1 -= f[15] * y1;
+      a3_2 -= f[15] * y2;
+      a3_3 -= f[15] * y3;
+    }
+  }
+  store_eight(own + 0 * width + 0, a0_0);
+  store_eight(own + 0 * width + 8, a0_1);
+  store_eight(own + 0 * width + 16, a0_2);
+  store_eight(own + 0 * width + 24, a0_3);
+  store_eight(own + 1 * width + 0, a1_0);
+  store_eight(own + 1 * width + 8, a1_1);
+  store_eight(own + 1 * width + 16, a1_2);
+  store_eight(own + 1 * width + 24, a1_3);
+  store_eight(own + 2 * width + 0, a2_0);
+  store_eight(own + 2 * width + 8, a2_1);
+  store_eight(own + 2 * width + 16, a2_2);
+  store_eight(own + 2 * width + 24, a2_3);
+  store_eight(own + 3 * width + 0, a3_0);
+  store_eight(own + 3 * width + 8, a3_1);
+  store_eight(own + 3 * width + 16, a3_2);
+  store_eight(own + 3 * width + 24, a3_3);
+}
+
+/* own = inverse' (own - sum of F' y over listed blocks) on the way up, added to x; 4 blocks of columns */
+static inline void up_4(const double *restrict F, const int *restrict block, const int *restrict state, const int first, const int last,
+                          const double *X, const int width, double *restrict x, double *own, const double *inverse) {
+  int l;
+  Eight a0_0 = load_eight(own + 0 * width + 0);
+  Eight a0_1 = load_eight(own + 0 * width + 8);
+  Eight a0_2 = load_eight(own + 0 * width + 16);
+  Eight a0_3 = load_eight(own + 0 * width + 24);
+  Eight a1_0 = load_eight(own + 1 * width + 0);
+  Eight a1_1 = load_eight(own + 1 * width + 8);
+  Eight a1_2 = load_eight(own + 1 * width + 16);
+  Eight a1_3 = load_eight(own + 1 * width + 24);
+  Eight a2_0 = load_eight(own + 2 * width + 0);
+  Eight a2_1 = load_eight(own + 2 * width + 8);
+  Eight a2_2 = load_eight(own + 2 * width + 16);
+  Eight a2_3 = load_eight(own + 2 * width + 24);
+  Eight a3_0 = load_eight(own + 3 * width + 0);
+  Eight a3_1 = load_eight(own + 3 * width + 8);
+  Eight a3_2 = load_eight(own + 3 * width + 16);
+  Eight a3_3 = load_eight(own + 3 * width + 24);
+  for (l = first; l < last; ++l) {
+    const double *f = F + SQUARE * block[l], *y = X + GAUSS * width * state[l];
+    {
+      const Eight y0 = load_eight(y + 0 * width + 0);
+      const Eight y1 = load_eight(y + 0 * width + 8);
+      const Eight y2 = load_eight(y + 0 * width + 16);
+      const Eight y3 = load_eight(y + 0 * width + 24);
+      a0_0 -= f[0] * y0;
+      a0_1 -= f[0] * y1;
+      a0_2 -= f[0] * y2;
+      a0_3 -= f[0] * y3;
+      a1_0 -= f[4] * y0;
+      a1_1 -= f[4] * y1;
+      a1_2 -= f[4] * y2;
+      a1_3 -= f[4] * y3;
+      a2_0 -= f[8] * y0;
+      a2_1 -= f[8] * y1;
+      a2_2 -= f[8] * y2;
+      a2_3 -= f[8] * y3;
+      a3_0 -= f[12] * y0;
+      a3_1 -= f[12] * y1;
+      a3_2 -= f[12] * y2;
+      a3_3 -= f[12] * y3;
+    }
+    {
+      const Eight y0 = load_eight(y + 1 * width + 0);
+      const Eight y1 = load_eight(y + 1 * width + 8);
+      const Eight y2 = load_eight(y + 1 * width + 16);
+      const Eight y3 = load_eight(y + 1 * width + 24);
+      a0_0 -= f[1] * y0;
+      a0_1 -= f[1] * y1;
+      a0_2 -= f[1] * y2;
+      a0_3 -= f[1] * y3;
+      a1_0 -= f[5] * y0;
+      a1_1 -= f[5] * y1;
+      a1_2 -= f[5] * y2;
+      a1_3 -= f[5] * y3;
+      a2_0 -= f[9] * y0;
+      a2_1 -= f[9] * y1;
+      a2_2 -= f[9] * y2;
+      a2_3 -= f[9] * y3;
+      a3_0 -= f[13] * y0;
+      a3_1 -= f[13] * y1;
+      a3_2 -= f[13] * y2;
+      a3_3 -= f[13] * y3;
+    }
+    {
+      const Eight y0 = load_eight(y + 2 * width + 0);
+      const Eight y1 = load_eight(y + 2 * width + 8);
+      const Eight y2 = load_eight(y + 2 * width + 16);
+      const Eight y3 = load_eight(y + 2 * width + 24);
+      a0_0 -= f[2] * y0;
+      a0_1 -= f[2] * y1;
+      a0_2 -= f[2] * y2;
+      a0_3 -= f[2] * y3;
+      a1_0 -= f[6] * y0;
+      a1_1 -= f[6] * y1;
+      a1_2 -= f[6] * y2;
+      a1_3 -= f[6] * y3;
+      a2_0 -= f[10] * y0;
+      a2_1 -= f[10] * y1;
+      a2_2 -= f[10] * y2;
+      a2_3 -= f[10] * y3;
+      a3_0 -= f[14] * y0;
+      a3_1 -= f[14] * y1;
+      a3_2 -= f[14] * y2;
+      a3_3 -= f[14] * y3;
+    }
+    {
+      const Eight y0 = load_eight(y + 3 * width + 0);
+      const Eight y1 = load_eight(y + 3 * width + 8);
+      const Eight y2 = load_eight(y + 3 * width + 16);
+      const Eight y3 = load_eight(y + 3 * width + 24);
+      a0_0 -= f[3] * y0;
+      a0_1 -= f[3] * y1;
+      a0_2 -= f[3] * y2;
+      a0_3 -= f[3] * y3;
+      a1_0 -= f[7] * y0;
+      a1_1 -= f[7] * y1;
+      a1_2 -= f[7] * y2;
+      a1_3 -= f[7] * y3;
+      a2_0 -= f[11] * y0;
+      a2_1 -= f[11] * y1;
+      a2_2 -= f[11] * y2;
+      a2_3 -= f[11] * y3;
+      a3_0 -= f[15] * y0;
+      a3_1 -= f[15] * y1;
+      a3_2 -= f[15] * y2;
+      a3_3 -= f[15] * y3;
+    }
+  }
+  if (inverse) {
+    {
+      const Eight y0 = a0_0, y1 = a1_0, y2 = a2_0, y3 = a3_0;
+      a0_0 = (inverse[0] * y0 + inverse[1] * y1) + (inverse[2] * y2 + inverse[3] * y3);
+      a1_0 = (inverse[4] * y0 + inverse[5] * y1) + (inverse[6] * y2 + inverse[7] * y3);
+      a2_0 = (inverse[8] * y0 + inverse[9] * y1) + (inverse[10] * y2 + inverse[11] * y3);
+      a3_0 = (inverse[12] * y0 + inverse[13] * y1) + (inverse[14] * y2 + inverse[15] * y3);
+    }
+    {
+      const Eight y0 = a0_1, y1 = a1_1, y2 = a2_1, y3 = a3_1;
+      a0_1 = (inverse[0] * y0 + inverse[1] * y1) + (inverse[2] * y2 + inverse[3] * y3);
+      a1_1 = (inverse[4] * y0 + inverse[5] * y1) + (inverse[6] * y2 + inverse[7] * y3);
+      a2_1 = (inverse[8] * y0 + inverse[9] * y1) + (inverse[10] * y2 + inverse[11] * y3);
+      a3_1 = (inverse[12] * y0 + inverse[13] * y1) + (inverse[14] * y2 + inverse[15] * y3);
+    }
+    {
+      const Eight y0 = a0_2, y1 = a1_2, y2 = a2_2, y3 = a3_2;
+      a0_2 = (inverse[0] * y0 + inverse[1] * y1) + (inverse[2] * y2 + inverse[3] * y3);
+      a1_2 = (inverse[4] * y0 + inverse[5] * y1) + (inverse[6] * y2 + inverse[7] * y3);
+      a2_2 = (inverse[8] * y0 + inverse[9] * y1) + (inverse[10] * y2 + inverse[11] * y3);
+      a3_2 = (inverse[12] * y0 + inverse[13] * y1) + (inverse[14] * y2 + inverse[15] * y3);
+    }
+    {
+      const Eight y0 = a0_3, y1 = a1_3, y2 = a2_3, y3 = a3_3;
+      a0_3 = (inverse[0] * y0 + inverse[1] * y1) + (inverse[2] * y2 + inverse[3] * y3);
+      a1_3 = (inverse[4] * y0 + inverse[5] * y1) + (inverse[6] * y2 + inverse[7] * y3);
+      a2_3 = (inverse[8] * y0 + inverse[9] * y1) + (inverse[10] * y2 + inverse[11] * y3);
+      a3_3 = (inverse[12] * y0 + inverse[13] * y1) + (inverse[14] * y2 + inverse[15] * y3);
+    }
+  }
+  store_eight(x + 0, load_eight(x + 0) + ((a0_0 + a1_0) + (a2_0 + a3_0)));
+  store_eight(x + 8, load_eight(x + 8) + ((a0_1 + a1_1) + (a2_1 + a3_1)));
+  store_eight(x + 16, load_eight(x + 16) + ((a0_2 + a1_2) + (a2_2 + a3_2)));
+  store_eight(x + 24, load_eight(x + 24) + ((a0_3 + a1_3) + (a2_3 + a3_3)));
+  store_eight(own + 0 * width + 0, a0_0);
+  store_eight(own + 0 * width + 8, a0_1);
+  store_eight(own + 0 * width + 16, a0_2);
+  store_eight(own + 0 * width + 24, a0_3);
+  store_eight(own + 1 * width + 0, a1_0);
+  store_eight(own + 1 * width + 8, a1_1);
+  store_eight(own + 1 * width + 16, a1_2);
+  store_eight(own + 1 * width + 24, a1_3);
+  store_eight(own + 2 * width + 0, a2_0);
+  store_eight(own + 2 * width + 8, a2_1);
+  store_eight(own + 2 * width + 16, a2_2);
+  store_eight(own + 2 * width + 24, a2_3);
+  store_eight(own + 3 * width + 0, a3_0);
+  store_eight(own + 3 * width + 8, a3_1);
+  store_eight(own + 3 * width + 16, a3_2);
+  store_eight(own + 3 * width + 24, a3_3);
+}
+
+static inline Eight positive(Eight x) {
+  Eight y;
+  int l;
+  for (l = 0; l < LANES; ++l) y[l] = fabs(x[l]);
+  return y;
+}
+
+/* Replace blocks side by side by their inverses, from minors of two rows; return whether all are far from singular. */
+static int invert(Eight *restrict d) {
+  const Eight a0 = d[0], a1 = d[1], a2 = d[2], a3 = d[3], b0 = d[4], b1 = d[5], b2 = d[6], b3 = d[7];
+  const Eight c0 = d[8], c1 = d[9], c2 = d[10], c3 = d[11], e0 = d[12], e1 = d[13], e2 = d[14], e3 = d[15];
+  const Eight u0 = a0 * b1 - b0 * a1, u1 = a0 * b2 - b0 * a2, u2 = a0 * b3 - b0 * a3;
+  const Eight u3 = a1 * b2 - b1 * a2, u4 = a1 * b3 - b1 * a3, u5 = a2 * b3 - b2 * a3;
+  const Eight l0 = c0 * e1 - e0 * c1, l1 = c0 * e2 - e0 * c2, l2 = c0 * e3 - e0 * c3;
+  const Eight l3 = c1 * e2 - e1 * c2, l4 = c1 * e3 - e1 * c3, l5 = c2 * e3 - e2 * c3;
+  const Eight determinant = u0 * l5 - u1 * l4 + u2 * l3 + u3 * l2 - u4 * l1 + u5 * l0, r = 1.0 / determinant;
+  const Eight size = positive(u0 * l5) + positive(u1 * l4) + positive(u2 * l3) + positive(u3 * l2) + positive(u4 * l1) + positive(u5 * l0);
+  int l, regular = 1;
+  d[0] = (b1 * l5 - b2 * l4 + b3 * l3) * r;
+  d[1] = (a2 * l4 - a1 * l5 - a3 * l3) * r;
+  d[2] = (e1 * u5 - e2 * u4 + e3 * u3) * r;
+  d[3] = (c2 * u4 - c1 * u5 - c3 * u3) * r;
+  d[4] = (b2 * l2 - b0 * l5 - b3 * l1) * r;
+  d[5] = (a0 * l5 - a2 * l2 + a3 * l1) * r;
+  d[6] = (e2 * u2 - e0 * u5 - e3 * u1) * r;
+  d[7] = (c0 * u5 - c2 * u2 + c3 * u1) * r;
+  d[8] = (b0 * l4 - b1 * l2 + b3 * l0) * r;
+  d[9] = (a1 * l2 - a0 * l4 - a3 * l0) * r;
+  d[10] = (e0 * u4 - e1 * u2 + e3 * u0) * r;
+  d[11] = (c1 * u2 - c0 * u4 - c3 * u0) * r;
+  d[12] = (b1 * l1 - b0 * l3 - b2 * l0) * r;
+  d[13] = (a0 * l3 - a1 * l1 + a2 * l0) * r;
+  d[14] = (e1 * u1 - e0 * u3 - e2 * u0) * r;
+  d[15] = (c0 * u3 - c1 * u1 + c2 * u0) * r;
+  for (l = 0; l < LANES; ++l) regular &= fabs(determinant[l]) > SINGULAR * size[l];
+  return regular;
+}
+
+/* to -= below right, or right = below right with `only`, of blocks side by side */
+static inline void multiply_blocks(const Eight *restrict below, const Eight *right, Eight *to, const int only) {
+  int k;
+  for (k = 0; k < SQUARE; k += GAUSS) {
+    const Eight x0 = right[k], x1 = right[k + 1], x2 = right[k + 2], x3 = right[k + 3];
+    {
+      const Eight sum = (below[0] * x0 + below[4] * x1) + (below[8] * x2 + below[12] * x3);
+      to[k + 0] = only ? sum : to[k + 0] - sum;
+    }
+    {
+      const Eight sum = (below[1] * x0 + below[5] * x1) + (below[9] * x2 + below[13] * x3);
+      to[k + 1] = only ? sum : to[k + 1] - sum;
+    }
+    {
+      const Eight sum = (below[2] * x0 + below[6] * x1) + (below[10] * x2 + below[14] * x3);
+      to[k + 2] = only ? sum : to[k + 2] - sum;
+    }
+    {
+      const Eight sum = (below[3] * x0 + below[7] * x1) + (below[11] * x2 + below[15] * x3);
+      to[k + 3] = only ? sum : to[k + 3] - sum;
+    }
+  }
+}
+
+/* Kind 0: 31 states, 214 blocks */
+static const int pivot_0[31] = { 29, 30, 3, 4, 5, 7, 8, 9, 10, 6, 11, 18, 19, 20, 21, 13, 1, 14, 15, 26, 27, 28, 12, 0, 2, 16, 17, 22, 23, 24, 25 };
+static const int diagonal_0[31] = { 0, 1, -1, -1, -1, -1, -1, -1, -1, 5, 10, -1, -1, -1, -1, 20, -1, -1, -1, 21, 23, 25, 30, 39, 50, 66, 83, 101,
+  120, 140, 161 };
+static const int entry_block_0[189] = { 39, 49, 64, 80, 97, 115, 134, 154, 32, 42, 204, 57, 73, 90, 108, 127, 147, 189, 201, 2, 11, 213, 3, 12, 212, 4,
+  13, 211, 5, 18, 6, 14, 210, 7, 15, 209, 8, 16, 208, 9, 17, 207, 10, 19, 38, 48, 192, 63, 79, 96, 114, 133, 153,
+  26, 20, 33, 43, 205, 58, 74, 91, 109, 128, 148, 34, 44, 206, 59, 75, 92, 110, 129, 149, 202, 188, 66, 82, 99,
+  117, 136, 156, 203, 187, 172, 83, 100, 118, 137, 157, 53, 69, 86, 104, 123, 143, 54, 70, 87, 105, 124, 144, 55,
+  71, 88, 106, 125, 145, 56, 72, 89, 107, 126, 146, 173, 168, 200, 101, 119, 138, 158, 174, 169, 199, 165, 120,
+  139, 159, 175, 170, 198, 166, 163, 140, 160, 176, 171, 197, 167, 164, 162, 161, 35, 45, 60, 76, 93, 111, 130,
+  150, 21, 22, 36, 46, 61, 77, 94, 112, 131, 151, 186, 23, 24, 37, 47, 62, 78, 95, 113, 132, 152, 185, 25, 31, 40,
+  51, 67, 84, 102, 121, 141, 0, 41, 52, 68, 85, 103, 122, 142, 1 };
+static const int right_start_0[32] = { 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 10, 13, 14, 15, 16, 17, 24, 25, 26, 27, 28, 29, 29, 32, 35, 37, 42, 46, 49, 51,
+  52, 52 };
+static const int right_block_0[52] = { 213, 212, 211, 210, 209, 208, 207, 204, 205, 206, 201, 202, 203, 200, 199, 198, 197, 190, 191, 192, 193, 194,
+  195, 196, 189, 188, 187, 186, 185, 182, 183, 184, 179, 180, 181, 177, 178, 172, 173, 174, 175, 176, 168, 169,
+  170, 171, 165, 166, 167, 163, 164, 162 };
+static const int above_start_0[32] = { 0, 0, 0, 0, 1, 2, 2, 3, 4, 5, 6, 7, 7, 7, 7, 7, 7, 9, 11, 13, 13, 14, 15, 16, 16, 21, 27, 34, 37, 41, 46, 52 };
+static const int above_state_0[52] = { 3, 4, 7, 8, 9, 5, 10, 6, 13, 6, 13, 6, 13, 26, 27, 13, 11, 13, 1, 12, 0, 11, 13, 14, 12, 0, 2, 11, 13, 15, 12,
+  0, 2, 16, 18, 16, 17, 19, 16, 17, 22, 20, 16, 17, 22, 23, 21, 16, 17, 22, 23, 24 };
+static const int above_block_0[52] = { 213, 212, 210, 209, 208, 211, 207, 204, 190, 205, 193, 206, 194, 186, 185, 192, 201, 191, 189, 182, 179, 202,
+  195, 188, 183, 180, 177, 203, 196, 187, 184, 181, 178, 172, 200, 173, 168, 199, 174, 169, 165, 198, 175, 170,
+  166, 163, 197, 176, 171, 167, 164, 162 };
+static const int below_start_0[32] = { 0, 8, 15, 17, 19, 21, 23, 25, 27, 29, 30, 31, 37, 43, 49, 55, 56, 65, 74, 83, 92, 101, 109, 117, 124, 130, 135,
+  139, 142, 144, 145, 145 };
+static const int below_state_0[145] = { 0, 2, 16, 17, 22, 23, 24, 25, 2, 16, 17, 22, 23, 24, 25, 6, 13, 6, 13, 6, 13, 11, 13, 11, 13, 11, 13, 11, 13,
+  13, 13, 16, 17, 22, 23, 24, 25, 16, 17, 22, 23, 24, 25, 16, 17, 22, 23, 24, 25, 16, 17, 22, 23, 24, 25, 12, 0,
+  2, 12, 16, 17, 22, 23, 24, 25, 0, 2, 12, 16, 17, 22, 23, 24, 25, 0, 2, 12, 16, 17, 22, 23, 24, 25, 0, 2, 16, 17,
+  22, 23, 24, 25, 27, 0, 2, 16, 17, 22, 23, 24, 25, 28, 0, 2, 16, 17, 22, 23, 24, 25, 0, 2, 16, 17, 22, 23, 24,
+  25, 2, 16, 17, 22, 23, 24, 25, 16, 17, 22, 23, 24, 25, 17, 22, 23, 24, 25, 22, 23, 24, 25, 23, 24, 25, 24, 25,
+  25 };
+static const int below_block_0[145] = { 31, 40, 51, 67, 84, 102, 121, 141, 41, 52, 68, 85, 103, 122, 142, 2, 11, 3, 12, 4, 13, 6, 14, 7, 15, 8, 16, 9,
+  17, 18, 19, 53, 69, 86, 104, 123, 143, 54, 70, 87, 105, 124, 144, 55, 71, 88, 106, 125, 145, 56, 72, 89, 107,
+  126, 146, 26, 32, 42, 27, 57, 73, 90, 108, 127, 147, 33, 43, 28, 58, 74, 91, 109, 128, 148, 34, 44, 29, 59, 75,
+  92, 110, 129, 149, 35, 45, 60, 76, 93, 111, 130, 150, 22, 36, 46, 61, 77, 94, 112, 131, 151, 24, 37, 47, 62, 78,
+  95, 113, 132, 152, 38, 48, 63, 79, 96, 114, 133, 153, 49, 64, 80, 97, 115, 134, 154, 65, 81, 98, 116, 135, 155,
+  82, 99, 117, 136, 156, 100, 118, 137, 157, 119, 138, 158, 139, 159, 160 };
+static const int entry_0[189] = { 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29,
+  30, 31, 32, 33, 34, 35, 36, 37, 38, 39, 40, 41, 42, 43, 44, 45, 46, 47, 48, 49, 50, 51, 52, 53, 54, 55, 56, 57,
+  58, 59, 60, 61, 62, 63, 64, 65, 66, 67, 68, 69, 70, 71, 72, 73, 74, 75, 76, 77, 78, 79, 80, 81, 82, 83, 84, 85,
+  86, 87, 88, 89, 90, 91, 92, 93, 94, 95, 96, 97, 98, 99, 100, 101, 102, 103, 104, 105, 106, 107, 108, 109, 110,
+  111, 112, 113, 114, 115, 116, 117, 118, 119, 120, 121, 122, 123, 124, 125, 126, 127, 128, 129, 130, 131, 132,
+  133, 134, 135, 136, 137, 138, 139, 140, 141, 142, 143, 144, 145, 146, 147, 148, 149, 150, 151, 152, 153, 154,
+  155, 156, 157, 158, 159, 160, 161, 162, 163, 164, 165, 166, 167, 168, 169, 170, 171, 172, 173, 174, 175, 176,
+  177, 178, 179, 180, 181, 182, 183, 184, 185, 186, 187, 188 };
+static const int target_0[208] = { 3, 12, 4, 13, 5, 18, 7, 15, 8, 16, 9, 17, 10, 19, 190, 193, 194, 191, 195, 196, 173, 168, 101, 119, 138, 158,
+  174, 169, 165, 120, 139, 159, 175, 170, 166, 163, 140, 160, 176, 171, 167, 164, 162, 161, 27, 182, 30, 28, 29,
+  183, 184, 179, 50, 182, 65, 81, 98, 116, 135, 155, 180, 177, 183, 66, 82, 99, 117, 136, 156, 181, 178, 184, 172,
+  83, 100, 118, 137, 157, 36, 46, 61, 77, 94, 112, 131, 151, 23, 37, 47, 62, 78, 95, 113, 132, 152, 25, 179, 180,
+  181, 50, 177, 178, 65, 66, 172, 81, 82, 83, 98, 99, 100, 116, 117, 118, 135, 136, 137, 155, 156, 157, 50, 177,
+  178, 65, 66, 172, 81, 82, 83, 98, 99, 100, 116, 117, 118, 135, 136, 137, 155, 156, 157, 66, 172, 82, 83, 99,
+  100, 117, 118, 136, 137, 156, 157, 83, 168, 169, 170, 171, 100, 101, 165, 166, 167, 118, 119, 120, 163, 164,
+  137, 138, 139, 140, 162, 157, 158, 159, 160, 161, 101, 165, 166, 167, 119, 120, 163, 164, 138, 139, 140, 162,
+  158, 159, 160, 161, 120, 163, 164, 139, 140, 162, 159, 160, 161, 140, 162, 160, 161, 161 };
+
+static int factorise_0(const Matrices *restrict m, const double *restrict h, Eight *restrict N) {
+  const int *target = target_0;
+  const Eight steps = load_eight(h);
+  int e, i, k, s, u, pivot;
+  memset(N, 0, 214 * SQUARE * sizeof *N);
+  for (e = 0; e < 189; ++e)
+    for (k = 0; k < GAUSS; ++k) {
+      const Eight entry = -steps * load_eight(m[k].A[entry_0[e]]);
+      for (s = 0; s < GAUSS; ++s) N[SQUARE * entry_block_0[e] + GAUSS * k + s] = gauss_matrix[GAUSS * k + s] * entry;
+    }
+  for (i = 0; i < 31; ++i)
+    for (s = 0; s < SQUARE && diagonal_0[i] != UNIT; s += GAUSS + 1) N[SQUARE * diagonal_0[i] + s] += 1.0;
+  for (pivot = 0; pivot < 31; ++pivot) {
+    if (diagonal_0[pivot] != UNIT) {
+      Eight *own = N + SQUARE * diagonal_0[pivot];
+      if (!invert(own)) return 0;
+      for (u = right_start_0[pivot]; u < right_start_0[pivot + 1]; ++u) {
+        Eight *block = N + SQUARE * right_block_0[u];
+        multiply_blocks(own, block, block, 1);
+      }
+    }
+    for (i = below_start_0[pivot]; i < below_start_0[pivot + 1]; ++i)
+      for (u = right_start_0[pivot]; u < right_start_0[pivot + 1]; ++u)
+        multiply_blocks(N + SQUARE * below_block_0[i], N + SQUARE * right_block_0[u], N + SQUARE * *target++, 0);
+  }
+  return 1;
+}
+
+/* One step back with columns x of kind 0; F its factors, `lane` its place in m */
+static void step_on_grid_0(const double *restrict F, const Matrices *restrict m, const int lane, double (*restrict x)[32],
+                            double (*restrict X)[GAUSS][32], double (*restrict noise)[GAUSS][COLUMNS], double (*restrict known)[COLUMNS]) {
+  enum { WIDTH = 32 };
+  int i, c;
+  {
+    double *at = X[0][0] + 0, *start = x[0] + 0;
+    for (i = 0; i < 31; ++i) {
+      const int own = pivot_0[i];
+      down_4(F, above_block_0, above_state_0, above_start_0[i], above_start_0[i + 1], at, WIDTH, start + WIDTH * own, at + GAUSS * WIDTH * own);
+    }
+    for (i = 30; i >= 0; --i) {
+      const int own = pivot_0[i], diagonal = diagonal_0[i];
+      up_4(F, below_block_0, below_state_0, below_start_0[i], below_start_0[i + 1], at, WIDTH, start + WIDTH * own, at + GAUSS * WIDTH * own,
+         diagonal == UNIT ? (const double *)0 : F + SQUARE * diagonal);
+    }
+  }
+  for (i = 0; i < GAUSS; ++i) {
+    const double inverse = 1.0 / gauss_weight[i];
+    const double a0 = inverse * gauss_matrix[GAUSS * i], a1 = inverse * gauss_matrix[GAUSS * i + 1], a2 = inverse * gauss_matrix[GAUSS * i + 2], a3 = inverse * gauss_matrix[GAUSS * i + 3];
+    for (c = 0; c < WIDTH; ++c) {
+      const double y0 = a0 * X[0][0][c] + a1 * X[0][1][c] + a2 * X[0][2][c] + a3 * X[0][3][c];
+      const double y2 = a0 * X[2][0][c] + a1 * X[2][1][c] + a2 * X[2][2][c] + a3 * X[2][3][c];
+      const double y16 = a0 * X[16][0][c] + a1 * X[16][1][c] + a2 * X[16][2][c] + a3 * X[16][3][c];
+      const double y17 = a0 * X[17][0][c] + a1 * X[17][1][c] + a2 * X[17][2][c] + a3 * X[17][3][c];
+      const double y22 = a0 * X[22][0][c] + a1 * X[22][1][c] + a2 * X[22][2][c] + a3 * X[22][3][c];
+      const double y23 = a0 * X[23][0][c] + a1 * X[23][1][c] + a2 * X[23][2][c] + a3 * X[23][3][c];
+      const double y24 = a0 * X[24][0][c] + a1 * X[24][1][c] + a2 * X[24][2][c] + a3 * X[24][3][c];
+      const double y25 = a0 * X[25][0][c] + a1 * X[25][1][c] + a2 * X[25][2][c] + a3 * X[25][3][c];
+      const double y26 = a0 * X[26][0][c] + a1 * X[26][1][c] + a2 * X[26][2][c] + a3 * X[26][3][c];
+      const double y27 = a0 * X[27][0][c] + a1 * X[27][1][c] + a2 * X[27][2][c] + a3 * X[27][3][c];
+      const double y28 = a0 * X[28][0][c] + a1 * X[28][1][c] + a2 * X[28][2][c] + a3 * X[28][3][c];
+      const double y29 = a0 * X[29][0][c] + a1 * X[29][1][c] + a2 * X[29][2][c] + a3 * X[29][3][c];
+      const double y30 = a0 * X[30][0][c] + a1 * X[30][1][c] + a2 * X[30][2][c] + a3 * X[30][3][c];
+      noise[0][i][0 + c] = m[i].B[0][lane] * y28;
+      noise[1][i][0 + c] = m[i].B[1][lane] * y26 + m[i].B[2][lane] * y27;
+      noise[2][i][0 + c] = m[i].B[3][lane] * y29;
+      noise[3][i][0 + c] = m[i].B[4][lane] * y30;
+      known[i][0 + c] = m[i].known[0][lane] * y0 + m[i].known[1][lane] * y2 + m[i].known[2][lane] * y16 + m[i].known[3][lane] * y17 + m[i].known[4][lane] * y22 + m[i].known[5][lane] * y23 + m[i].known[6][lane] * y24 + m[i].known[7][lane] * y25;
+    }
+    (void)a0; (void)a1; (void)a2; (void)a3;
+  }
+  (void)m; (void)lane; (void)noise;
+}
+
+/* Add one step's integral of g g' of some noises to the upper blocks of W, four rows at a time. */
+static void add_products_on_grid(const double (*restrict noise)[GAUSS][COLUMNS], const double h, double (*restrict W)[COLUMNS], const int *restrict of) {
+  int r, c, j, n;
+  for (r = of[2]; r < of[3]; r += 4)
+    for (n = of[0]; n < of[0] + of[1]; ++n) {
+      const double (*restrict g)[COLUMNS] = noise[n];
+      double *restrict row0 = W[r + 0];
+      const double a0_0 = h * gauss_weight[0] * g[0][r + 0], a0_1 = h * gauss_weight[1] * g[1][r + 0], a0_2 = h * gauss_weight[2] * g[2][r + 0], a0_3 = h * gauss_weight[3] * g[3][r + 0];
+      double *restrict row1 = W[r + 1];
+      const double a1_0 = h * gauss_weight[0] * g[0][r + 1], a1_1 = h * gauss_weight[1] * g[1][r + 1], a1_2 = h * gauss_weight[2] * g[2][r + 1], a1_3 = h * gauss_weight[3] * g[3][r + 1];
+      double *restrict row2 = W[r + 2];
+      const double a2_0 = h * gauss_weight[0] * g[0][r + 2], a2_1 = h * gauss_weight[1] * g[1][r + 2], a2_2 = h * gauss_weight[2] * g[2][r + 2], a2_3 = h * gauss_weight[3] * g[3][r + 2];
+      double *restrict row3 = W[r + 3];
+      const double a3_0 = h * gauss_weight[0] * g[0][r + 3], a3_1 = h * gauss_weight[1] * g[1][r + 3], a3_2 = h * gauss_weight[2] * g[2][r + 3], a3_3 = h * gauss_weight[3] * g[3][r + 3];
+      for (c = of[4] > r / LANES * LANES ? of[4] : r / LANES * LANES; c < of[5]; c += LANES)
+        for (j = c; j < c + LANES; ++j) {
+          row0[j] += (a0_0 * g[0][j] + a0_1 * g[1][j]) + (a0_2 * g[2][j] + a0_3 * g[3][j]);
+          row1[j] += (a1_0 * g[0][j] + a1_1 * g[1][j]) + (a1_2 * g[2][j] + a1_3 * g[3][j]);
+          row2[j] += (a2_0 * g[0][j] + a2_1 * g[1][j]) + (a2_2 * g[2][j] + a2_3 * g[3][j]);
+          row3[j] += (a3_0 * g[0][j] + a3_1 * g[1][j]) + (a3_2 * g[2][j] + a3_3 * g[3][j]);
+        }
+    }
+}
+
+/* What a run on a grid needs, too much for the stack of a thread */
+typedef struct {
+  Eight N_0[214 * SQUARE];
+  double F_0[SIDE][214 * SQUARE];
+  double x_0[31][32], X_0[31][GAUSS][32];
+  double noise[NOISES_1][GAUSS][COLUMNS], known[GAUSS][COLUMNS];
+  double v[GAUSS][TABLE_VALUES_1][STAGES], t[GAUSS][1][STAGES], h[SIDE];
+  Matrices m[GAUSS];
+  Segment g;
+} OnGrid;
+
+/* Evaluate and eliminate `count` steps from edges[0] on, side by side; room that is left repeats the first. */
+static int factorise_steps(Flight *f, const double *edges, const int count, OnGrid *w) {
+  int i, j, k, n;
+  for (j = 0; j < STAGES; ++j) { /* the matrices have room for more than is eliminated */
+    const int of = j < count ? j : 0;
+    if (j < SIDE) w->h[j] = edges[of + 1] - edges[of];
+    for (i = 0; i < GAUSS; ++i) {
+      if (j < count) {
+        w->t[i][0][j] = smaller(larger(edges[j] + gauss_node[i] * (edges[j + 1] - edges[j]), f->low), f->high);
+        lookup(f, w->t[i][0][j], w->v[i], j);
+      } else {
+        w->t[i][0][j] = w->t[i][0][0];
+        for (k = 0; k < TABLE_VALUES; ++k) w->v[i][k][j] = w->v[i][k][0];
+      }
+    }
+  }
+  for (i = 0; i < GAUSS; ++i)
+    stage_matrices((const double (*)[STAGES])w->t[i], (const double (*)[STAGES])w->v[i], f->p, w->m[i].A, w->m[i].B, w->m[i].known);
+  if (!factorise_0(w->m, w->h, w->N_0)) return 0;
+  for (n = 0; n < 214 * SQUARE; n += LANES) transpose_eight(w->N_0 + n, w->F_0[0] + n, 214 * SQUARE);
+  return 1;
+}
+
+static int segment_on_grid(Flight *f, const double *edges, const int steps, OnGrid *w, Counters *done, Failure *why, const volatile int *stop) {
+  Segment *g = &w->g;
+  int i, j, k, last, first;
+  double sum = 0.0;
+  memset(g, 0, sizeof *g);
+  memset(w->noise, 0, sizeof w->noise);
+  memset(w->known, 0, sizeof w->known);
+  memset(w->x_0, 0, sizeof w->x_0);
+  w->x_0[0][0] = 1.0;
+  w->x_0[1][1] = 1.0;
+  w->x_0[2][2] = 1.0;
+  w->x_0[3][3] = 1.0;
+  w->x_0[4][4] = 1.0;
+  w->x_0[5][5] = 1.0;
+  w->x_0[6][6] = 1.0;
+  w->x_0[7][7] = 1.0;
+  w->x_0[8][8] = 1.0;
+  w->x_0[9][9] = 1.0;
+  w->x_0[10][10] = 1.0;
+  w->x_0[11][11] = 1.0;
+  w->x_0[12][12] = 1.0;
+  w->x_0[13][13] = 1.0;
+  w->x_0[14][14] = 1.0;
+  w->x_0[15][15] = 1.0;
+  w->x_0[16][16] = 1.0;
+  w->x_0[17][17] = 1.0;
+  w->x_0[18][18] = 1.0;
+  w->x_0[19][19] = 1.0;
+  w->x_0[20][20] = 1.0;
+  w->x_0[21][21] = 1.0;
+  w->x_0[22][22] = 1.0;
+  w->x_0[23][23] = 1.0;
+  w->x_0[24][24] = 1.0;
+  w->x_0[25][25] = 1.0;
+  w->x_0[26][26] = 1.0;
+  w->x_0[27][27] = 1.0;
+  w->x_0[28][28] = 1.0;
+  w->x_0[29][29] = 1.0;
+  w->x_0[30][30] = 1.0;
+  for (last = steps; last > 0; last = first) {
+    first = last > SIDE ? last - SIDE : 0;
+    if (*stop) return STOPPED;
+    why->time = edges[first];
+    if (!factorise_steps(f, edges + first, last - first, w)) {
+      for (i = 0; i < GAUSS; ++i) {
+        const int entry = not_finite(w->m + i, &j);
+        if (entry >= 0) {
+          why->time = w->t[i][0][j];
+          why->entry = entry;
+          return NOT_FINITE;
+        }
+      }
+      return NEARLY_SINGULAR;
+    }
+    done->evaluations += GAUSS * (last - first);
+    done->steps += last - first;
+    for (j = last - first - 1; j >= 0; --j) {
+      step_on_grid_0(w->F_0[j], w->m, j, w->x_0, w->X_0, w->noise, w->known);
+      for (i = 0; i < PRODUCTS; ++i)
+        add_products_on_grid((const double (*)[GAUSS][COLUMNS])w->noise, w->h[j], g->W[noise_source[product[i][0]]], product[i]);
+      for (i = 0; i < GAUSS; ++i)
+        for (k = 0; k < COLUMNS; ++k) g->z[k] += w->h[j] * gauss_weight[i] * w->known[i][k];
+    }
+  }
+  for (i = 0; i < 31; ++i) memcpy(g->transposed[row_0[i]] + 0 * LANES, w->x_0[i], sizeof w->x_0[i]);
+  for (k = 0; k < SOURCES; ++k)
+    for (i = 0; i < COLUMNS; ++i)
+      for (j = 0; j < i; ++j) g->W[k][i][j] = g->W[k][j][i];
+  for (i = 0; i < STATES; ++i)
+    for (j = 0; j < COLUMNS; ++j) sum += fabs(g->transposed[i][j]);
+  return isfinite(sum) ? DONE : OUT_OF_RANGE;
+}
+
+/* Sweep over `count` segments of which number k has steps[k] steps between `edges`; the rest as of sweep. */
+EXPORT int sweep_on_grid(int count, const double *end, const double *low, const double *high, const int *steps, const double *edges,
+                         const double *p, const double *tables, double *start_P, double *m, double *covariance, double *mean,
+                         double *transition, double *added, double *counters, double *failure, const volatile int *stop) {
+  double C[C_SIZE], direct[RESPONSES], next[STATES], P[SOURCES_1][COLUMNS][COLUMNS], P_next[SOURCES_1][COLUMNS][COLUMNS];
+  double inherited[SOURCES_1 * RESPONSES];
+  void *room = malloc(sizeof(OnGrid) + LANES * sizeof(double)); /* vectors want to stand on a multiple of their size */
+  OnGrid *w = (OnGrid *)(((size_t)room + LANES * sizeof(double) - 1) / (LANES * sizeof(double)) * (LANES * sizeof(double)));
+  Flight f;
+  Counters done = { 0.0, 0.0, 0.0 };
+  Failure why = { 0.0, -1.0 };
+  int i, j, s, k, code = room ? DONE : NEARLY_SINGULAR;
+  f.p = p;
+  f.tables = tables;
+  memset(f.piece, 0, sizeof f.piece);
+  memset(P, 0, sizeof P);
+  for (s = 0; s < SOURCES; ++s)
+    for (i = 0; i < STATES; ++i)
+      for (j = 0; j < STATES; ++j) P[s][i][j] = start_P[(s * STATES + i) * STATES + j];
+  for (k = 0; k < count && code == DONE; ++k) {
+    double *result = covariance + k * SOURCES * RESPONSES * RESPONSES;
+    f.low = low[k];
+    f.high = high[k];
+    code = segment_on_grid(&f, edges, steps[k], w, &done, &why, stop);
+    edges += steps[k];
+    if (code != DONE) break;
+    evaluate_output(&f, end[k], C, direct);
+    forward(&w->g, C, (const double (*)[COLUMNS][COLUMNS])P, P_next, result, inherited);
+    memcpy(P, P_next, sizeof P);
+    for (i = 0; i < SOURCES * RESPONSES * RESPONSES; ++i)
+      if (!(fabs(result[i]) <= 1e200)) {
+        why.time = end[k];
+        code = OUT_OF_RANGE;
+      }
+    carry_mean(&w->g, m, next);
+    memcpy(m, next, sizeof next);
+    respond(C, direct, m, mean + k * RESPONSES);
+    for (i = 0; i < RESPONSES; ++i)
+      if (!(fabs(mean[k * RESPONSES + i]) <= 1e200)) {
+        why.time = end[k];
+        code = OUT_OF_RANGE;
+      }
+    if (transition)
+      for (i = 0; i < STATES; ++i)
+        for (j = 0; j < STATES; ++j) transition[(k * STATES + i) * STATES + j] = w->g.transposed[j][i];
+    if (added)
+      for (s = 0; s < SOURCES; ++s)
+        for (i = 0; i < STATES; ++i)
+          for (j = 0; j < STATES; ++j) added[((k * SOURCES + s) * STATES + i) * STATES + j] = w->g.W[s][i][j];
+  }
+  for (s = 0; s < SOURCES; ++s)
+    for (i = 0; i < STATES; ++i)
+      for (j = 0; j < STATES; ++j) start_P[(s * STATES + i) * STATES + j] = P[s][i][j];
+  free(room);
+  counters[0] = done.steps;
+  counters[1] = done.rejected;
+  counters[2] = done.evaluations;
+  failure[0] = why.time;
+  failure[1] = why.entry;
+  return code;
 }

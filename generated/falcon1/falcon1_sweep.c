@@ -42,7 +42,7 @@
 enum {
   STATES = 35, LANES = 8, BLOCKS = 5, COLUMNS = BLOCKS * LANES, ROWS = 35, /* most of a block */
   STAGES = 12, NODES = 8, /* stages whose weight is not zero */
-  SOURCES = 4, NOISES = 5, RESPONSES = 13,
+  SOURCES = 4, NOISES = 5, RESPONSES = 13, WIDE = 16, /* responses, in whole registers */
   HORIZON = 5, /* segments over which effects are followed to weigh errors */
   TABLE_VALUES = 149, GROUPS = 3
 };
@@ -4718,29 +4718,33 @@ static void add_quadrature_errors(const double h, const double (*restrict gain)[
   }
 }
 
-/* Noise, and the rows and columns of W that it adds to: upper blocks */
-enum { PRODUCTS = 7 };
-static const int product[7][5] = { { 0, 0, 32, 0, 32 }, { 1, 0, 32, 0, 32 }, { 2, 0, 40, 0, 40 }, { 3, 0, 24, 0, 24 }, { 3, 0, 24, 32, 40 }, { 3, 32, 40, 32, 40 }, { 4, 0, 32, 0, 32 } };
+/* First and number of noises of one source that reach the same columns, and the rows and columns of W that they add to:
+ * upper blocks */
+enum { PRODUCTS = 6 };
+static const int product[6][6] = { { 0, 2, 0, 32, 0, 32 }, { 2, 1, 0, 40, 0, 40 }, { 3, 1, 0, 24, 0, 24 }, { 3, 1, 0, 24, 32, 40 }, { 3, 1, 32, 40, 32, 40 }, { 4, 1, 0, 32, 0, 32 } };
 
-/* Add one step's integral of g g' to the upper blocks of W, two rows at a time. */
-static void add_products(const double (*restrict g)[COLUMNS], const double h, double (*restrict W)[COLUMNS],
+/* Add one step's integral of g g' of some noises to the upper blocks of W, two rows at a time, so that these stay near. */
+static void add_products(const double (*restrict noise)[NODES][COLUMNS], const double h, double (*restrict W)[COLUMNS],
                          const int *restrict of) {
-  int r, c, j;
-  for (r = of[1]; r < of[2]; r += 2) {
+  int r, c, j, n;
+  for (r = of[2]; r < of[3]; r += 2) {
     double *restrict first = W[r], *restrict second = W[r + 1];
-    const double a0 = h * node_weight[0] * g[0][r], b0 = h * node_weight[0] * g[0][r + 1];
-    const double a1 = h * node_weight[1] * g[1][r], b1 = h * node_weight[1] * g[1][r + 1];
-    const double a2 = h * node_weight[2] * g[2][r], b2 = h * node_weight[2] * g[2][r + 1];
-    const double a3 = h * node_weight[3] * g[3][r], b3 = h * node_weight[3] * g[3][r + 1];
-    const double a4 = h * node_weight[4] * g[4][r], b4 = h * node_weight[4] * g[4][r + 1];
-    const double a5 = h * node_weight[5] * g[5][r], b5 = h * node_weight[5] * g[5][r + 1];
-    const double a6 = h * node_weight[6] * g[6][r], b6 = h * node_weight[6] * g[6][r + 1];
-    const double a7 = h * node_weight[7] * g[7][r], b7 = h * node_weight[7] * g[7][r + 1];
-    for (c = of[3] > r / LANES * LANES ? of[3] : r / LANES * LANES; c < of[4]; c += LANES)
-      for (j = c; j < c + LANES; ++j) {
-        first[j] += a0 * g[0][j] + a1 * g[1][j] + a2 * g[2][j] + a3 * g[3][j] + a4 * g[4][j] + a5 * g[5][j] + a6 * g[6][j] + a7 * g[7][j];
-        second[j] += b0 * g[0][j] + b1 * g[1][j] + b2 * g[2][j] + b3 * g[3][j] + b4 * g[4][j] + b5 * g[5][j] + b6 * g[6][j] + b7 * g[7][j];
-      }
+    for (n = of[0]; n < of[0] + of[1]; ++n) {
+      const double (*restrict g)[COLUMNS] = noise[n];
+      const double a0 = h * node_weight[0] * g[0][r], b0 = h * node_weight[0] * g[0][r + 1];
+      const double a1 = h * node_weight[1] * g[1][r], b1 = h * node_weight[1] * g[1][r + 1];
+      const double a2 = h * node_weight[2] * g[2][r], b2 = h * node_weight[2] * g[2][r + 1];
+      const double a3 = h * node_weight[3] * g[3][r], b3 = h * node_weight[3] * g[3][r + 1];
+      const double a4 = h * node_weight[4] * g[4][r], b4 = h * node_weight[4] * g[4][r + 1];
+      const double a5 = h * node_weight[5] * g[5][r], b5 = h * node_weight[5] * g[5][r + 1];
+      const double a6 = h * node_weight[6] * g[6][r], b6 = h * node_weight[6] * g[6][r + 1];
+      const double a7 = h * node_weight[7] * g[7][r], b7 = h * node_weight[7] * g[7][r + 1];
+      for (c = of[4] > r / LANES * LANES ? of[4] : r / LANES * LANES; c < of[5]; c += LANES)
+        for (j = c; j < c + LANES; ++j) {
+          first[j] += a0 * g[0][j] + a1 * g[1][j] + a2 * g[2][j] + a3 * g[3][j] + a4 * g[4][j] + a5 * g[5][j] + a6 * g[6][j] + a7 * g[7][j];
+          second[j] += b0 * g[0][j] + b1 * g[1][j] + b2 * g[2][j] + b3 * g[3][j] + b4 * g[4][j] + b5 * g[5][j] + b6 * g[6][j] + b7 * g[7][j];
+        }
+    }
   }
 }
 
@@ -4825,7 +4829,7 @@ static int sweep_segment(Flight *f, double begin, double end, double tolerance, 
     t = pieces > 1.0 ? t - h : begin;
     memcpy(x, s.next, sizeof x);
     for (i = 0; i < PRODUCTS; ++i)
-      add_products((const double (*)[COLUMNS])s.noise[product[i][0]], h, g->W[noise_source[product[i][0]]], product[i]);
+      add_products((const double (*)[NODES][COLUMNS])s.noise, h, g->W[noise_source[product[i][0]]], product[i]);
     for (j = 0; j < COLUMNS; ++j) {
       for (i = 0; i < NODES; ++i) g->z[j] += h * node_weight[i] * s.known[i][j];
       g->error[j] += s.remaining[j];
@@ -4847,134 +4851,74 @@ static int sweep_segment(Flight *f, double begin, double end, double tolerance, 
 
 static const int first_of_kind[BLOCKS] = { 0, 0, 0, 24, 32 }; /* first column of each block's kind */
 
-/* result = factor' from, over the rows of a kind, `width` columns from its first on */
-static void multiply_own_0(const double (*restrict factor)[COLUMNS], const int count,
-                          const double (*restrict from)[24], double (*restrict result)[COLUMNS]) {
-  int i, k, c;
-  for (i = 0; i < count; ++i) {
-    double sum[24] = { 0.0 };
-    for (k = 0; k < 35; ++k)
-      for (c = 0; c < 24; ++c) sum[c] += factor[k][i] * from[k][c];
-    for (c = 0; c < 24; ++c) result[i][0 + c] = sum[c];
-  }
+/* Add factor' from to result, four rows and 32 columns at a time */
+static void multiply(const double *restrict factor, const int stride, const int rows, const int inner,
+                     const double (*restrict from)[COLUMNS], const int columns, double (*restrict result)[COLUMNS]) {
+  int i, k, c, j;
+  for (i = 0; i < rows; i += 4)
+    for (c = 0; c < columns; ) {
+      if (columns - c >= 4 * LANES) {
+        double sum[4][4 * LANES] = { { 0.0 } };
+        for (k = 0; k < inner; ++k)
+          for (j = 0; j < 4 * LANES; ++j) {
+            sum[0][j] += factor[k * stride + i] * from[k][c + j];
+            sum[1][j] += factor[k * stride + i + 1] * from[k][c + j];
+            sum[2][j] += factor[k * stride + i + 2] * from[k][c + j];
+            sum[3][j] += factor[k * stride + i + 3] * from[k][c + j];
+          }
+        for (k = 0; k < 4; ++k) memcpy(result[i + k] + c, sum[k], sizeof sum[k]);
+        c += 4 * LANES;
+      } else {
+        double sum[4][LANES] = { { 0.0 } };
+        for (k = 0; k < inner; ++k)
+          for (j = 0; j < LANES; ++j) {
+            sum[0][j] += factor[k * stride + i] * from[k][c + j];
+            sum[1][j] += factor[k * stride + i + 1] * from[k][c + j];
+            sum[2][j] += factor[k * stride + i + 2] * from[k][c + j];
+            sum[3][j] += factor[k * stride + i + 3] * from[k][c + j];
+          }
+        for (k = 0; k < 4; ++k) memcpy(result[i + k] + c, sum[k], sizeof sum[k]);
+        c += LANES;
+      }
+    }
 }
 
-/* result = factor' from, over the rows of a kind, `width` columns from its first on */
-static void multiply_upper_0(const double (*restrict factor)[COLUMNS], const int count,
-                          const double (*restrict from)[40], double (*restrict result)[COLUMNS]) {
-  int i, k, c;
-  for (i = 0; i < count; ++i) {
-    double sum[40] = { 0.0 };
-    for (k = 0; k < 35; ++k)
-      for (c = 0; c < 40; ++c) sum[c] += factor[k][i] * from[k][c];
-    for (c = 0; c < 40; ++c) result[i][0 + c] = sum[c];
-  }
-}
-
-/* result = factor' from, over the rows of a kind, `width` columns from its first on */
-static void multiply_own_1(const double (*restrict factor)[COLUMNS], const int count,
-                          const double (*restrict from)[8], double (*restrict result)[COLUMNS]) {
-  int i, k, c;
-  for (i = 0; i < count; ++i) {
-    double sum[8] = { 0.0 };
-    for (k = 0; k < 11; ++k)
-      for (c = 0; c < 8; ++c) sum[c] += factor[k][i] * from[k][c];
-    for (c = 0; c < 8; ++c) result[i][24 + c] = sum[c];
-  }
-}
-
-/* result = factor' from, over the rows of a kind, `width` columns from its first on */
-static void multiply_upper_1(const double (*restrict factor)[COLUMNS], const int count,
-                          const double (*restrict from)[16], double (*restrict result)[COLUMNS]) {
-  int i, k, c;
-  for (i = 0; i < count; ++i) {
-    double sum[16] = { 0.0 };
-    for (k = 0; k < 11; ++k)
-      for (c = 0; c < 16; ++c) sum[c] += factor[k][i] * from[k][c];
-    for (c = 0; c < 16; ++c) result[i][24 + c] = sum[c];
-  }
-}
-
-/* result = factor' from, over the rows of a kind, `width` columns from its first on */
-static void multiply_own_2(const double (*restrict factor)[COLUMNS], const int count,
-                          const double (*restrict from)[8], double (*restrict result)[COLUMNS]) {
-  int i, k, c;
-  for (i = 0; i < count; ++i) {
-    double sum[8] = { 0.0 };
-    for (k = 0; k < 3; ++k)
-      for (c = 0; c < 8; ++c) sum[c] += factor[k][i] * from[k][c];
-    for (c = 0; c < 8; ++c) result[i][32 + c] = sum[c];
-  }
-}
-
-/* result = factor' from, over the rows of a kind, `width` columns from its first on */
-static void multiply_upper_2(const double (*restrict factor)[COLUMNS], const int count,
-                          const double (*restrict from)[8], double (*restrict result)[COLUMNS]) {
-  int i, k, c;
-  for (i = 0; i < count; ++i) {
-    double sum[8] = { 0.0 };
-    for (k = 0; k < 3; ++k)
-      for (c = 0; c < 8; ++c) sum[c] += factor[k][i] * from[k][c];
-    for (c = 0; c < 8; ++c) result[i][32 + c] = sum[c];
-  }
-}
-
-/* inherited = Phi P Phi', both over states; P is symmetric. What is multiplied is gathered before. */
-static void carry(const Segment *restrict g, const double *restrict P, double (*restrict inherited)[STATES]) {
-  double factor[ROWS][COLUMNS] = { { 0.0 } }, right[STATES][COLUMNS], result[COLUMNS][COLUMNS];
+/* inherited = Phi P Phi', all in the order of columns; P is symmetric. What is multiplied is gathered before. */
+static void carry(const Segment *restrict g, const double (*restrict P)[COLUMNS], double (*restrict inherited)[COLUMNS]) {
+  double factor[ROWS][COLUMNS], from[ROWS][COLUMNS], right[COLUMNS][COLUMNS];
   int i, j;
-  {
-    double phi[35][24];
-    for (i = 0; i < 35; ++i) {
-      memcpy(factor[i], P + row_0[i] * STATES, STATES * sizeof(double));
-      memcpy(phi[i], g->transposed[row_0[i]] + 0, sizeof phi[i]);
-    }
-    multiply_own_0((const double (*)[COLUMNS])factor, STATES, (const double (*)[24])phi, right);
+  for (i = 0; i < 35; ++i) {
+    memcpy(factor[i], P[place[row_0[i]]], sizeof factor[i]);
+    memcpy(from[i], g->transposed[row_0[i]] + 0 * LANES, 3 * LANES * sizeof(double));
   }
-  {
-    double phi[11][8];
-    for (i = 0; i < 11; ++i) {
-      memcpy(factor[i], P + row_1[i] * STATES, STATES * sizeof(double));
-      memcpy(phi[i], g->transposed[row_1[i]] + 24, sizeof phi[i]);
-    }
-    multiply_own_1((const double (*)[COLUMNS])factor, STATES, (const double (*)[8])phi, right);
+  multiply(factor[0], COLUMNS, COLUMNS, 35, (const double (*)[COLUMNS])from, 3 * LANES, (double (*)[COLUMNS])(right[0] + 0 * LANES));
+  for (i = 0; i < 11; ++i) {
+    memcpy(factor[i], P[place[row_1[i]]], sizeof factor[i]);
+    memcpy(from[i], g->transposed[row_1[i]] + 3 * LANES, 1 * LANES * sizeof(double));
   }
-  {
-    double phi[3][8];
-    for (i = 0; i < 3; ++i) {
-      memcpy(factor[i], P + row_2[i] * STATES, STATES * sizeof(double));
-      memcpy(phi[i], g->transposed[row_2[i]] + 32, sizeof phi[i]);
-    }
-    multiply_own_2((const double (*)[COLUMNS])factor, STATES, (const double (*)[8])phi, right);
+  multiply(factor[0], COLUMNS, COLUMNS, 11, (const double (*)[COLUMNS])from, 1 * LANES, (double (*)[COLUMNS])(right[0] + 3 * LANES));
+  for (i = 0; i < 3; ++i) {
+    memcpy(factor[i], P[place[row_2[i]]], sizeof factor[i]);
+    memcpy(from[i], g->transposed[row_2[i]] + 4 * LANES, 1 * LANES * sizeof(double));
   }
-  {
-    double from[35][40];
-    for (i = 0; i < 35; ++i) {
-      memcpy(factor[i], g->transposed[row_0[i]] + 0, 3 * LANES * sizeof(double));
-      memcpy(from[i], right[row_0[i]] + 0, sizeof from[i]);
-    }
-    multiply_upper_0((const double (*)[COLUMNS])factor, 24, (const double (*)[40])from, result + 0);
+  multiply(factor[0], COLUMNS, COLUMNS, 3, (const double (*)[COLUMNS])from, 1 * LANES, (double (*)[COLUMNS])(right[0] + 4 * LANES));
+  for (i = 0; i < 35; ++i) {
+    memcpy(factor[i], g->transposed[row_0[i]] + 0 * LANES, 3 * LANES * sizeof(double));
+    memcpy(from[i], right[place[row_0[i]]] + 0 * LANES, (BLOCKS - 0) * LANES * sizeof(double));
   }
-  {
-    double from[11][16];
-    for (i = 0; i < 11; ++i) {
-      memcpy(factor[i], g->transposed[row_1[i]] + 24, 1 * LANES * sizeof(double));
-      memcpy(from[i], right[row_1[i]] + 24, sizeof from[i]);
-    }
-    multiply_upper_1((const double (*)[COLUMNS])factor, 8, (const double (*)[16])from, result + 24);
+  multiply(factor[0], COLUMNS, 3 * LANES, 35, (const double (*)[COLUMNS])from, (BLOCKS - 0) * LANES, (double (*)[COLUMNS])(inherited[0 * LANES] + 0 * LANES));
+  for (i = 0; i < 11; ++i) {
+    memcpy(factor[i], g->transposed[row_1[i]] + 3 * LANES, 1 * LANES * sizeof(double));
+    memcpy(from[i], right[place[row_1[i]]] + 3 * LANES, (BLOCKS - 3) * LANES * sizeof(double));
   }
-  {
-    double from[3][8];
-    for (i = 0; i < 3; ++i) {
-      memcpy(factor[i], g->transposed[row_2[i]] + 32, 1 * LANES * sizeof(double));
-      memcpy(from[i], right[row_2[i]] + 32, sizeof from[i]);
-    }
-    multiply_upper_2((const double (*)[COLUMNS])factor, 3, (const double (*)[8])from, result + 32);
+  multiply(factor[0], COLUMNS, 1 * LANES, 11, (const double (*)[COLUMNS])from, (BLOCKS - 3) * LANES, (double (*)[COLUMNS])(inherited[3 * LANES] + 3 * LANES));
+  for (i = 0; i < 3; ++i) {
+    memcpy(factor[i], g->transposed[row_2[i]] + 4 * LANES, 1 * LANES * sizeof(double));
+    memcpy(from[i], right[place[row_2[i]]] + 4 * LANES, (BLOCKS - 4) * LANES * sizeof(double));
   }
+  multiply(factor[0], COLUMNS, 1 * LANES, 3, (const double (*)[COLUMNS])from, (BLOCKS - 4) * LANES, (double (*)[COLUMNS])(inherited[4 * LANES] + 4 * LANES));
   for (i = 0; i < COLUMNS; ++i) /* the lower blocks */
-    for (j = 0; j < first_of_kind[i / LANES]; ++j) result[i][j] = result[j][i];
-  for (i = 0; i < STATES; ++i)
-    for (j = 0; j < STATES; ++j) inherited[i][j] = result[place[i]][place[j]];
+    for (j = 0; j < first_of_kind[i / LANES]; ++j) inherited[i][j] = inherited[j][i];
 }
 
 /* Weigh the errors of the adjoint of state r by typical sizes alone. */
@@ -4996,36 +4940,271 @@ static void weigh_by_size(const double *size, int r, Weights *w) {
  * ones). A hundredth of the weight that would keep every single state accurate is the least. w->gain: the second
  * factor alone, last that of the mean, against the largest of the sources and itself. What is smaller than SMALLEST of
  * its typical size is not resolved. */
-static void weigh(const double *C, const Segment *restrict g, const double *P, const double *covariance,
+static void weigh(const double *C, const Segment *restrict g, const double (*P)[COLUMNS][COLUMNS], const double *covariance,
                   const double *m, const double *mean, const double *typical, Weights *w) {
-  static const double unit[RESPONSES] = { 0.0 };
-  double effect[HORIZON * RESPONSES][COLUMNS], column[STATES], y[RESPONSES], size[STATES], by_column[COLUMNS] = { 0.0 };
-  double phi[COLUMNS][COLUMNS], all[STATES + RESPONSES];
+  double effect[HORIZON * WIDE][COLUMNS], transposed[COLUMNS][HORIZON * WIDE], most[HORIZON * WIDE];
+  double before[COLUMNS][WIDE], phi[COLUMNS][COLUMNS], part[WIDE][COLUMNS], size[STATES];
+  double by_column[COLUMNS] = { 0.0 }, all[STATES + RESPONSES];
   int s, b, i, j, r;
   memset(effect, 0, sizeof effect);
   memset(phi, 0, sizeof phi);
   memset(w, 0, sizeof *w);
-  memset(column, 0, sizeof column);
-  for (r = 0; r < STATES; ++r) {
-    column[r] = 1.0;
-    respond(C, unit, column, y);
-    for (i = 0; i < RESPONSES; ++i) effect[i][place[r]] = y[i];
-    column[r] = 0.0;
-  }
-  for (r = 0; r < COLUMNS; ++r)
-    for (j = 0; j < STATES; ++j) phi[r][place[j]] = g->transposed[j][r];
-  for (i = RESPONSES; i < HORIZON * RESPONSES; ++i) {
-    double sum[COLUMNS] = { 0.0 };
+  effect[0][0] = C[0];
+  effect[0][1] = C[10];
+  effect[0][7] = C[20];
+  effect[0][9] = C[29];
+  effect[0][10] = C[38];
+  effect[0][11] = C[47];
+  effect[0][12] = C[55];
+  effect[0][13] = C[63];
+  effect[0][14] = C[71];
+  effect[0][15] = C[79];
+  effect[0][16] = C[87];
+  effect[0][17] = C[95];
+  effect[0][18] = C[103];
+  effect[0][24] = C[111];
+  effect[0][26] = C[121];
+  effect[0][19] = C[131];
+  effect[0][21] = C[141];
+  effect[0][28] = C[151];
+  effect[0][29] = C[161];
+  effect[0][30] = C[171];
+  effect[0][32] = C[181];
+  effect[0][33] = C[191];
+  effect[0][23] = C[201];
+  effect[0][34] = C[211];
+  effect[0][31] = C[221];
+  effect[1][0] = C[1];
+  effect[1][1] = C[11];
+  effect[1][7] = C[21];
+  effect[1][9] = C[30];
+  effect[1][10] = C[39];
+  effect[1][11] = C[48];
+  effect[1][12] = C[56];
+  effect[1][13] = C[64];
+  effect[1][14] = C[72];
+  effect[1][15] = C[80];
+  effect[1][16] = C[88];
+  effect[1][17] = C[96];
+  effect[1][18] = C[104];
+  effect[1][24] = C[112];
+  effect[1][26] = C[122];
+  effect[1][19] = C[132];
+  effect[1][21] = C[142];
+  effect[1][28] = C[152];
+  effect[1][29] = C[162];
+  effect[1][30] = C[172];
+  effect[1][32] = C[182];
+  effect[1][33] = C[192];
+  effect[1][23] = C[202];
+  effect[1][34] = C[212];
+  effect[1][31] = C[222];
+  effect[2][0] = C[2];
+  effect[2][1] = C[12];
+  effect[2][24] = C[113];
+  effect[2][26] = C[123];
+  effect[2][19] = C[133];
+  effect[2][21] = C[143];
+  effect[2][28] = C[153];
+  effect[2][29] = C[163];
+  effect[2][30] = C[173];
+  effect[2][32] = C[183];
+  effect[2][33] = C[193];
+  effect[2][23] = C[203];
+  effect[3][7] = C[22];
+  effect[3][9] = C[31];
+  effect[3][10] = C[40];
+  effect[4][0] = C[3];
+  effect[4][1] = C[13];
+  effect[4][7] = C[23];
+  effect[4][9] = C[32];
+  effect[4][10] = C[41];
+  effect[4][11] = C[49];
+  effect[4][12] = C[57];
+  effect[4][13] = C[65];
+  effect[4][14] = C[73];
+  effect[4][15] = C[81];
+  effect[4][16] = C[89];
+  effect[4][17] = C[97];
+  effect[4][18] = C[105];
+  effect[4][24] = C[114];
+  effect[4][26] = C[124];
+  effect[4][19] = C[134];
+  effect[4][21] = C[144];
+  effect[4][28] = C[154];
+  effect[4][29] = C[164];
+  effect[4][30] = C[174];
+  effect[4][32] = C[184];
+  effect[4][33] = C[194];
+  effect[4][23] = C[204];
+  effect[4][34] = C[213];
+  effect[4][31] = C[223];
+  effect[5][0] = C[4];
+  effect[5][1] = C[14];
+  effect[5][7] = C[24];
+  effect[5][9] = C[33];
+  effect[5][10] = C[42];
+  effect[5][11] = C[50];
+  effect[5][12] = C[58];
+  effect[5][13] = C[66];
+  effect[5][14] = C[74];
+  effect[5][15] = C[82];
+  effect[5][16] = C[90];
+  effect[5][17] = C[98];
+  effect[5][18] = C[106];
+  effect[5][24] = C[115];
+  effect[5][26] = C[125];
+  effect[5][19] = C[135];
+  effect[5][21] = C[145];
+  effect[5][28] = C[155];
+  effect[5][29] = C[165];
+  effect[5][30] = C[175];
+  effect[5][32] = C[185];
+  effect[5][33] = C[195];
+  effect[5][23] = C[205];
+  effect[5][34] = C[214];
+  effect[5][31] = C[224];
+  effect[6][34] = C[215];
+  effect[7][34] = C[216];
+  effect[8][0] = C[5];
+  effect[8][1] = C[15];
+  effect[8][7] = C[25];
+  effect[8][9] = C[34];
+  effect[8][10] = C[43];
+  effect[8][11] = C[51];
+  effect[8][12] = C[59];
+  effect[8][13] = C[67];
+  effect[8][14] = C[75];
+  effect[8][15] = C[83];
+  effect[8][16] = C[91];
+  effect[8][17] = C[99];
+  effect[8][18] = C[107];
+  effect[8][24] = C[116];
+  effect[8][26] = C[126];
+  effect[8][19] = C[136];
+  effect[8][21] = C[146];
+  effect[8][28] = C[156];
+  effect[8][29] = C[166];
+  effect[8][30] = C[176];
+  effect[8][32] = C[186];
+  effect[8][33] = C[196];
+  effect[8][23] = C[206];
+  effect[8][34] = C[217];
+  effect[8][31] = C[225];
+  effect[9][0] = C[6];
+  effect[9][1] = C[16];
+  effect[9][7] = C[26];
+  effect[9][9] = C[35];
+  effect[9][10] = C[44];
+  effect[9][11] = C[52];
+  effect[9][12] = C[60];
+  effect[9][13] = C[68];
+  effect[9][14] = C[76];
+  effect[9][15] = C[84];
+  effect[9][16] = C[92];
+  effect[9][17] = C[100];
+  effect[9][18] = C[108];
+  effect[9][24] = C[117];
+  effect[9][26] = C[127];
+  effect[9][19] = C[137];
+  effect[9][21] = C[147];
+  effect[9][28] = C[157];
+  effect[9][29] = C[167];
+  effect[9][30] = C[177];
+  effect[9][32] = C[187];
+  effect[9][33] = C[197];
+  effect[9][23] = C[207];
+  effect[9][34] = C[218];
+  effect[9][31] = C[226];
+  effect[10][0] = C[7];
+  effect[10][1] = C[17];
+  effect[10][7] = C[27];
+  effect[10][9] = C[36];
+  effect[10][10] = C[45];
+  effect[10][11] = C[53];
+  effect[10][12] = C[61];
+  effect[10][13] = C[69];
+  effect[10][14] = C[77];
+  effect[10][15] = C[85];
+  effect[10][16] = C[93];
+  effect[10][17] = C[101];
+  effect[10][18] = C[109];
+  effect[10][24] = C[118];
+  effect[10][26] = C[128];
+  effect[10][19] = C[138];
+  effect[10][21] = C[148];
+  effect[10][28] = C[158];
+  effect[10][29] = C[168];
+  effect[10][30] = C[178];
+  effect[10][32] = C[188];
+  effect[10][33] = C[198];
+  effect[10][23] = C[208];
+  effect[10][34] = C[219];
+  effect[10][31] = C[227];
+  effect[11][0] = C[8];
+  effect[11][1] = C[18];
+  effect[11][7] = C[28];
+  effect[11][9] = C[37];
+  effect[11][10] = C[46];
+  effect[11][11] = C[54];
+  effect[11][12] = C[62];
+  effect[11][13] = C[70];
+  effect[11][14] = C[78];
+  effect[11][15] = C[86];
+  effect[11][16] = C[94];
+  effect[11][17] = C[102];
+  effect[11][18] = C[110];
+  effect[11][24] = C[119];
+  effect[11][26] = C[129];
+  effect[11][19] = C[139];
+  effect[11][21] = C[149];
+  effect[11][28] = C[159];
+  effect[11][29] = C[169];
+  effect[11][30] = C[179];
+  effect[11][32] = C[189];
+  effect[11][33] = C[199];
+  effect[11][23] = C[209];
+  effect[11][34] = C[220];
+  effect[11][31] = C[228];
+  effect[12][0] = C[9];
+  effect[12][1] = C[19];
+  effect[12][24] = C[120];
+  effect[12][26] = C[130];
+  effect[12][19] = C[140];
+  effect[12][21] = C[150];
+  effect[12][28] = C[160];
+  effect[12][29] = C[170];
+  effect[12][30] = C[180];
+  effect[12][32] = C[190];
+  effect[12][33] = C[200];
+  effect[12][23] = C[210];
+  for (r = 0; r < 35; ++r)
+    for (j = 0 * LANES; j < 3 * LANES; ++j) phi[j][r] = g->transposed[row_0[r]][j];
+  for (r = 0; r < 11; ++r)
+    for (j = 3 * LANES; j < 4 * LANES; ++j) phi[j][r] = g->transposed[row_1[r]][j];
+  for (r = 0; r < 3; ++r)
+    for (j = 4 * LANES; j < 5 * LANES; ++j) phi[j][r] = g->transposed[row_2[r]][j];
+  for (i = WIDE; i < HORIZON * WIDE; i += WIDE) {
     for (r = 0; r < COLUMNS; ++r)
-      for (j = 0; j < COLUMNS; ++j) sum[j] += effect[i - RESPONSES][r] * phi[r][j];
-    for (j = 0; j < COLUMNS; ++j) effect[i][j] = sum[j];
+      for (j = 0; j < WIDE; ++j) before[r][j] = effect[i - WIDE + j][r];
+    multiply(before[0 * LANES], WIDE, WIDE, 3 * LANES, (const double (*)[COLUMNS])(phi + 0 * LANES), 40, part);
+    for (j = 0; j < WIDE; ++j)
+      for (r = 0; r < 35; ++r) effect[i + j][place[row_0[r]]] += part[j][r];
+    multiply(before[3 * LANES], WIDE, WIDE, 1 * LANES, (const double (*)[COLUMNS])(phi + 3 * LANES), 16, part);
+    for (j = 0; j < WIDE; ++j)
+      for (r = 0; r < 11; ++r) effect[i + j][place[row_1[r]]] += part[j][r];
+    multiply(before[4 * LANES], WIDE, WIDE, 1 * LANES, (const double (*)[COLUMNS])(phi + 4 * LANES), 8, part);
+    for (j = 0; j < WIDE; ++j)
+      for (r = 0; r < 3; ++r) effect[i + j][place[row_2[r]]] += part[j][r];
   }
+  for (i = 0; i < HORIZON * WIDE; ++i)
+    for (r = 0; r < COLUMNS; ++r) transposed[r][i] = effect[i][r] = fabs(effect[i][r]);
   for (r = 0; r < STATES; ++r) all[r] = fabs(m[r]);
   for (i = 0; i < RESPONSES; ++i) all[STATES + i] = fabs(mean[i]);
   for (s = 0; s <= SOURCES; ++s) {
     double *factor = w->gain[s], deviation[RESPONSES];
     for (r = 0; r < STATES; ++r) {
-      const double variance = s < SOURCES ? P[(s * STATES + r) * STATES + r] : all[r] * all[r];
+      const double variance = s < SOURCES ? P[s][place[r]][place[r]] : all[r] * all[r];
       by_column[place[r]] = size[r] = variance > 0.0 ? sqrt(variance) : 0.0;
       all[r] = larger(all[r], size[r]);
       factor[place[r]] = size[r] > 0.0 ? 0.01 / larger(size[r], SMALLEST * typical[r]) : 0.0;
@@ -5035,23 +5214,17 @@ static void weigh(const double *C, const Segment *restrict g, const double *P, c
       deviation[i] = variance > 0.0 ? sqrt(variance) : 0.0;
       all[STATES + i] = larger(all[STATES + i], deviation[i]);
     }
-    for (i = 0; i < HORIZON * RESPONSES; ++i) {
-      const double least = SMALLEST * typical[STATES + i % RESPONSES];
-      double now = 0.0, then = 0.0, inverse;
-      double nows[LANES] = { 0.0 }, thens[LANES] = { 0.0 };
-      for (r = 0; r < COLUMNS; r += LANES)
-        for (j = 0; j < LANES; ++j) {
-          nows[j] = larger(nows[j], fabs(effect[i % RESPONSES][r + j]) * by_column[r + j]);
-          thens[j] = larger(thens[j], fabs(effect[i][r + j]) * by_column[r + j]);
-        }
-      for (j = 0; j < LANES; ++j) {
-        now = larger(now, nows[j]);
-        then = larger(then, thens[j]);
-      }
+    for (i = 0; i < HORIZON * WIDE; ++i) most[i] = 0.0;
+    for (r = 0; r < COLUMNS; ++r)
+      for (i = 0; i < HORIZON * WIDE; ++i) most[i] = larger(most[i], transposed[r][i] * by_column[r]);
+    for (i = 0; i < HORIZON * WIDE; ++i) {
+      const int response = i % WIDE;
+      double inverse;
+      if (response >= RESPONSES) continue;
       /* where a system grows, so does the response that errors are held against */
-      inverse = deviation[i % RESPONSES] > 0.0 ? 1.0 / larger(deviation[i % RESPONSES], least) : 0.0;
-      if (then > now) inverse *= now / then;
-      for (r = 0; r < COLUMNS; ++r) factor[r] = larger(factor[r], fabs(effect[i][r]) * inverse);
+      inverse = deviation[response] > 0.0 ? 1.0 / larger(deviation[response], SMALLEST * typical[STATES + response]) : 0.0;
+      if (most[i] > most[response]) inverse *= most[response] / most[i];
+      for (r = 0; r < COLUMNS; ++r) factor[r] = larger(factor[r], effect[i][r] * inverse);
     }
     for (b = 0; b < 3 && s < SOURCES; ++b)
       for (j = 0; j < 35; ++j)
@@ -5068,10 +5241,10 @@ static void weigh(const double *C, const Segment *restrict g, const double *P, c
   }
   /* what no noise reaches is weighed by typical sizes, for the mean */
   for (r = 0; r < STATES; ++r) {
-    double most = 0.0, felt = 0.0;
-    for (s = 0; s < SOURCES; ++s) most = larger(most, w->gain[s][place[r]]);
-    for (i = 0; i < HORIZON * RESPONSES; ++i) felt = larger(felt, fabs(effect[i][place[r]]));
-    if (most == 0.0 && felt > 0.0) {
+    double gained = 0.0, felt = 0.0;
+    for (s = 0; s < SOURCES; ++s) gained = larger(gained, w->gain[s][place[r]]);
+    for (i = 0; i < HORIZON * WIDE; ++i) felt = larger(felt, effect[i][place[r]]);
+    if (gained == 0.0 && felt > 0.0) {
       const double own = w->gain[SOURCES][place[r]];
       weigh_by_size(typical, r, w);
       if (own > 0.0) w->gain[SOURCES][place[r]] = own;
@@ -5088,31 +5261,57 @@ static void carry_mean(const Segment *restrict g, const double *restrict m, doub
   }
 }
 
-static void covariance_of(const double *C, const double *P, double *result) {
-  static const double none[RESPONSES] = { 0.0 };
-  double half[STATES][RESPONSES];
-  double column[STATES];
-  int i, r;
-  for (i = 0; i < STATES; ++i) respond(C, none, P + i * STATES, half[i]);
-  for (r = 0; r < RESPONSES; ++r) {
-    for (i = 0; i < STATES; ++i) column[i] = half[i][r];
-    respond(C, none, column, result + r * RESPONSES);
+/* C P C'; P in the order of columns */
+static void covariance_of(const double *C, const double (*restrict P)[COLUMNS], double *result) {
+  double half[RESPONSES][COLUMNS];
+  int c, r;
+  for (c = 0; c < COLUMNS; ++c) {
+    half[0][c] = C[0] * P[0][c] + C[10] * P[1][c] + C[20] * P[7][c] + C[29] * P[9][c] + C[38] * P[10][c] + C[47] * P[11][c] + C[55] * P[12][c] + C[63] * P[13][c] + C[71] * P[14][c] + C[79] * P[15][c] + C[87] * P[16][c] + C[95] * P[17][c] + C[103] * P[18][c] + C[111] * P[24][c] + C[121] * P[26][c] + C[131] * P[19][c] + C[141] * P[21][c] + C[151] * P[28][c] + C[161] * P[29][c] + C[171] * P[30][c] + C[181] * P[32][c] + C[191] * P[33][c] + C[201] * P[23][c] + C[211] * P[34][c] + C[221] * P[31][c];
+    half[1][c] = C[1] * P[0][c] + C[11] * P[1][c] + C[21] * P[7][c] + C[30] * P[9][c] + C[39] * P[10][c] + C[48] * P[11][c] + C[56] * P[12][c] + C[64] * P[13][c] + C[72] * P[14][c] + C[80] * P[15][c] + C[88] * P[16][c] + C[96] * P[17][c] + C[104] * P[18][c] + C[112] * P[24][c] + C[122] * P[26][c] + C[132] * P[19][c] + C[142] * P[21][c] + C[152] * P[28][c] + C[162] * P[29][c] + C[172] * P[30][c] + C[182] * P[32][c] + C[192] * P[33][c] + C[202] * P[23][c] + C[212] * P[34][c] + C[222] * P[31][c];
+    half[2][c] = C[2] * P[0][c] + C[12] * P[1][c] + C[113] * P[24][c] + C[123] * P[26][c] + C[133] * P[19][c] + C[143] * P[21][c] + C[153] * P[28][c] + C[163] * P[29][c] + C[173] * P[30][c] + C[183] * P[32][c] + C[193] * P[33][c] + C[203] * P[23][c];
+    half[3][c] = C[22] * P[7][c] + C[31] * P[9][c] + C[40] * P[10][c];
+    half[4][c] = C[3] * P[0][c] + C[13] * P[1][c] + C[23] * P[7][c] + C[32] * P[9][c] + C[41] * P[10][c] + C[49] * P[11][c] + C[57] * P[12][c] + C[65] * P[13][c] + C[73] * P[14][c] + C[81] * P[15][c] + C[89] * P[16][c] + C[97] * P[17][c] + C[105] * P[18][c] + C[114] * P[24][c] + C[124] * P[26][c] + C[134] * P[19][c] + C[144] * P[21][c] + C[154] * P[28][c] + C[164] * P[29][c] + C[174] * P[30][c] + C[184] * P[32][c] + C[194] * P[33][c] + C[204] * P[23][c] + C[213] * P[34][c] + C[223] * P[31][c];
+    half[5][c] = C[4] * P[0][c] + C[14] * P[1][c] + C[24] * P[7][c] + C[33] * P[9][c] + C[42] * P[10][c] + C[50] * P[11][c] + C[58] * P[12][c] + C[66] * P[13][c] + C[74] * P[14][c] + C[82] * P[15][c] + C[90] * P[16][c] + C[98] * P[17][c] + C[106] * P[18][c] + C[115] * P[24][c] + C[125] * P[26][c] + C[135] * P[19][c] + C[145] * P[21][c] + C[155] * P[28][c] + C[165] * P[29][c] + C[175] * P[30][c] + C[185] * P[32][c] + C[195] * P[33][c] + C[205] * P[23][c] + C[214] * P[34][c] + C[224] * P[31][c];
+    half[6][c] = C[215] * P[34][c];
+    half[7][c] = C[216] * P[34][c];
+    half[8][c] = C[5] * P[0][c] + C[15] * P[1][c] + C[25] * P[7][c] + C[34] * P[9][c] + C[43] * P[10][c] + C[51] * P[11][c] + C[59] * P[12][c] + C[67] * P[13][c] + C[75] * P[14][c] + C[83] * P[15][c] + C[91] * P[16][c] + C[99] * P[17][c] + C[107] * P[18][c] + C[116] * P[24][c] + C[126] * P[26][c] + C[136] * P[19][c] + C[146] * P[21][c] + C[156] * P[28][c] + C[166] * P[29][c] + C[176] * P[30][c] + C[186] * P[32][c] + C[196] * P[33][c] + C[206] * P[23][c] + C[217] * P[34][c] + C[225] * P[31][c];
+    half[9][c] = C[6] * P[0][c] + C[16] * P[1][c] + C[26] * P[7][c] + C[35] * P[9][c] + C[44] * P[10][c] + C[52] * P[11][c] + C[60] * P[12][c] + C[68] * P[13][c] + C[76] * P[14][c] + C[84] * P[15][c] + C[92] * P[16][c] + C[100] * P[17][c] + C[108] * P[18][c] + C[117] * P[24][c] + C[127] * P[26][c] + C[137] * P[19][c] + C[147] * P[21][c] + C[157] * P[28][c] + C[167] * P[29][c] + C[177] * P[30][c] + C[187] * P[32][c] + C[197] * P[33][c] + C[207] * P[23][c] + C[218] * P[34][c] + C[226] * P[31][c];
+    half[10][c] = C[7] * P[0][c] + C[17] * P[1][c] + C[27] * P[7][c] + C[36] * P[9][c] + C[45] * P[10][c] + C[53] * P[11][c] + C[61] * P[12][c] + C[69] * P[13][c] + C[77] * P[14][c] + C[85] * P[15][c] + C[93] * P[16][c] + C[101] * P[17][c] + C[109] * P[18][c] + C[118] * P[24][c] + C[128] * P[26][c] + C[138] * P[19][c] + C[148] * P[21][c] + C[158] * P[28][c] + C[168] * P[29][c] + C[178] * P[30][c] + C[188] * P[32][c] + C[198] * P[33][c] + C[208] * P[23][c] + C[219] * P[34][c] + C[227] * P[31][c];
+    half[11][c] = C[8] * P[0][c] + C[18] * P[1][c] + C[28] * P[7][c] + C[37] * P[9][c] + C[46] * P[10][c] + C[54] * P[11][c] + C[62] * P[12][c] + C[70] * P[13][c] + C[78] * P[14][c] + C[86] * P[15][c] + C[94] * P[16][c] + C[102] * P[17][c] + C[110] * P[18][c] + C[119] * P[24][c] + C[129] * P[26][c] + C[139] * P[19][c] + C[149] * P[21][c] + C[159] * P[28][c] + C[169] * P[29][c] + C[179] * P[30][c] + C[189] * P[32][c] + C[199] * P[33][c] + C[209] * P[23][c] + C[220] * P[34][c] + C[228] * P[31][c];
+    half[12][c] = C[9] * P[0][c] + C[19] * P[1][c] + C[120] * P[24][c] + C[130] * P[26][c] + C[140] * P[19][c] + C[150] * P[21][c] + C[160] * P[28][c] + C[170] * P[29][c] + C[180] * P[30][c] + C[190] * P[32][c] + C[200] * P[33][c] + C[210] * P[23][c];
   }
+  for (r = 0; r < RESPONSES; ++r, result += RESPONSES) {
+    const double *restrict of = half[r];
+    result[0] = C[0] * of[0] + C[10] * of[1] + C[20] * of[7] + C[29] * of[9] + C[38] * of[10] + C[47] * of[11] + C[55] * of[12] + C[63] * of[13] + C[71] * of[14] + C[79] * of[15] + C[87] * of[16] + C[95] * of[17] + C[103] * of[18] + C[111] * of[24] + C[121] * of[26] + C[131] * of[19] + C[141] * of[21] + C[151] * of[28] + C[161] * of[29] + C[171] * of[30] + C[181] * of[32] + C[191] * of[33] + C[201] * of[23] + C[211] * of[34] + C[221] * of[31];
+    result[1] = C[1] * of[0] + C[11] * of[1] + C[21] * of[7] + C[30] * of[9] + C[39] * of[10] + C[48] * of[11] + C[56] * of[12] + C[64] * of[13] + C[72] * of[14] + C[80] * of[15] + C[88] * of[16] + C[96] * of[17] + C[104] * of[18] + C[112] * of[24] + C[122] * of[26] + C[132] * of[19] + C[142] * of[21] + C[152] * of[28] + C[162] * of[29] + C[172] * of[30] + C[182] * of[32] + C[192] * of[33] + C[202] * of[23] + C[212] * of[34] + C[222] * of[31];
+    result[2] = C[2] * of[0] + C[12] * of[1] + C[113] * of[24] + C[123] * of[26] + C[133] * of[19] + C[143] * of[21] + C[153] * of[28] + C[163] * of[29] + C[173] * of[30] + C[183] * of[32] + C[193] * of[33] + C[203] * of[23];
+    result[3] = C[22] * of[7] + C[31] * of[9] + C[40] * of[10];
+    result[4] = C[3] * of[0] + C[13] * of[1] + C[23] * of[7] + C[32] * of[9] + C[41] * of[10] + C[49] * of[11] + C[57] * of[12] + C[65] * of[13] + C[73] * of[14] + C[81] * of[15] + C[89] * of[16] + C[97] * of[17] + C[105] * of[18] + C[114] * of[24] + C[124] * of[26] + C[134] * of[19] + C[144] * of[21] + C[154] * of[28] + C[164] * of[29] + C[174] * of[30] + C[184] * of[32] + C[194] * of[33] + C[204] * of[23] + C[213] * of[34] + C[223] * of[31];
+    result[5] = C[4] * of[0] + C[14] * of[1] + C[24] * of[7] + C[33] * of[9] + C[42] * of[10] + C[50] * of[11] + C[58] * of[12] + C[66] * of[13] + C[74] * of[14] + C[82] * of[15] + C[90] * of[16] + C[98] * of[17] + C[106] * of[18] + C[115] * of[24] + C[125] * of[26] + C[135] * of[19] + C[145] * of[21] + C[155] * of[28] + C[165] * of[29] + C[175] * of[30] + C[185] * of[32] + C[195] * of[33] + C[205] * of[23] + C[214] * of[34] + C[224] * of[31];
+    result[6] = C[215] * of[34];
+    result[7] = C[216] * of[34];
+    result[8] = C[5] * of[0] + C[15] * of[1] + C[25] * of[7] + C[34] * of[9] + C[43] * of[10] + C[51] * of[11] + C[59] * of[12] + C[67] * of[13] + C[75] * of[14] + C[83] * of[15] + C[91] * of[16] + C[99] * of[17] + C[107] * of[18] + C[116] * of[24] + C[126] * of[26] + C[136] * of[19] + C[146] * of[21] + C[156] * of[28] + C[166] * of[29] + C[176] * of[30] + C[186] * of[32] + C[196] * of[33] + C[206] * of[23] + C[217] * of[34] + C[225] * of[31];
+    result[9] = C[6] * of[0] + C[16] * of[1] + C[26] * of[7] + C[35] * of[9] + C[44] * of[10] + C[52] * of[11] + C[60] * of[12] + C[68] * of[13] + C[76] * of[14] + C[84] * of[15] + C[92] * of[16] + C[100] * of[17] + C[108] * of[18] + C[117] * of[24] + C[127] * of[26] + C[137] * of[19] + C[147] * of[21] + C[157] * of[28] + C[167] * of[29] + C[177] * of[30] + C[187] * of[32] + C[197] * of[33] + C[207] * of[23] + C[218] * of[34] + C[226] * of[31];
+    result[10] = C[7] * of[0] + C[17] * of[1] + C[27] * of[7] + C[36] * of[9] + C[45] * of[10] + C[53] * of[11] + C[61] * of[12] + C[69] * of[13] + C[77] * of[14] + C[85] * of[15] + C[93] * of[16] + C[101] * of[17] + C[109] * of[18] + C[118] * of[24] + C[128] * of[26] + C[138] * of[19] + C[148] * of[21] + C[158] * of[28] + C[168] * of[29] + C[178] * of[30] + C[188] * of[32] + C[198] * of[33] + C[208] * of[23] + C[219] * of[34] + C[227] * of[31];
+    result[11] = C[8] * of[0] + C[18] * of[1] + C[28] * of[7] + C[37] * of[9] + C[46] * of[10] + C[54] * of[11] + C[62] * of[12] + C[70] * of[13] + C[78] * of[14] + C[86] * of[15] + C[94] * of[16] + C[102] * of[17] + C[110] * of[18] + C[119] * of[24] + C[129] * of[26] + C[139] * of[19] + C[149] * of[21] + C[159] * of[28] + C[169] * of[29] + C[179] * of[30] + C[189] * of[32] + C[199] * of[33] + C[209] * of[23] + C[220] * of[34] + C[228] * of[31];
+    result[12] = C[9] * of[0] + C[19] * of[1] + C[120] * of[24] + C[130] * of[26] + C[140] * of[19] + C[150] * of[21] + C[160] * of[28] + C[170] * of[29] + C[180] * of[30] + C[190] * of[32] + C[200] * of[33] + C[210] * of[23];
+    (void)of;
+  }
+  (void)C; (void)P;
 }
 
 /* P_next = Phi P Phi' + W and the covariance of the responses, with the part of each variance that P brought */
-static void forward(const Segment *restrict g, const double *C, const double *P, double *P_next, double *covariance,
-                    double *inherited) {
-  double carried[STATES][STATES], part[RESPONSES * RESPONSES];
+static void forward(const Segment *restrict g, const double *C, const double (*restrict P)[COLUMNS][COLUMNS],
+                    double (*restrict P_next)[COLUMNS][COLUMNS], double *covariance, double *inherited) {
+  double part[RESPONSES * RESPONSES];
   int s, i, j;
   for (s = 0; s < SOURCES; ++s) {
-    double *next = P_next + s * STATES * STATES;
-    carry(g, P + s * STATES * STATES, carried);
-    covariance_of(C, &carried[0][0], part);
+    carry(g, P[s], P_next[s]);
+    covariance_of(C, (const double (*)[COLUMNS])P_next[s], part);
     for (i = 0; i < RESPONSES; ++i) inherited[s * RESPONSES + i] = part[i * RESPONSES + i];
-    for (i = 0; i < STATES; ++i)
-      for (j = 0; j < STATES; ++j) next[i * STATES + j] = carried[i][j] + g->W[s][place[i]][place[j]];
-    covariance_of(C, next, covariance + s * RESPONSES * RESPONSES);
+    for (i = 0; i < COLUMNS; ++i)
+      for (j = 0; j < COLUMNS; ++j) P_next[s][i][j] += g->W[s][i][j];
+    covariance_of(C, (const double (*)[COLUMNS])P_next[s], covariance + s * RESPONSES * RESPONSES);
   }
 }
 
@@ -5126,7 +5325,7 @@ static int asked_too_much(int code, const Counters *done) {
  * low, high      limits of table lookup in each segment
  * tolerance      of one step, relative to the size of the states
  * size           typical sizes of the states, used until covariances are known, then those of the responses
- * P, m           covariance of each source and mean at the start; at the end on return
+ * start_P, m     covariance of each source and mean at the start; at the end on return
  * covariance     (count, SOURCES, RESPONSES, RESPONSES)
  * mean           (count, RESPONSES)
  * estimate       (count, SOURCES, RESPONSES) relative error of the standard deviation
@@ -5136,10 +5335,10 @@ static int asked_too_much(int code, const Counters *done) {
  * failure        time, entry
  * stop           looked at in every step; not zero ends the call */
 EXPORT int sweep(int count, double start, const double *end, const double *low, const double *high, const double *p,
-                 const double *tables, double tolerance, const double *size, double *P, double *m, double *covariance,
+                 const double *tables, double tolerance, const double *size, double *start_P, double *m, double *covariance,
                  double *mean, double *estimate, double *transition, double *added, double *counters, double *failure,
                  const volatile int *stop) {
-  double C[C_SIZE], direct[RESPONSES], next[STATES], P_next[SOURCES_1 * STATES * STATES];
+  double C[C_SIZE], direct[RESPONSES], next[STATES], P[SOURCES_1][COLUMNS][COLUMNS], P_next[SOURCES_1][COLUMNS][COLUMNS];
   double inherited[SOURCES_1 * RESPONSES], largest[SOURCES_1], made = 0.0;
   Segment g;
   Weights weights;
@@ -5152,6 +5351,10 @@ EXPORT int sweep(int count, double start, const double *end, const double *low, 
   f.tables = tables;
   memset(f.piece, 0, sizeof f.piece);
   memset(largest, 0, sizeof largest);
+  memset(P, 0, sizeof P);
+  for (s = 0; s < SOURCES; ++s)
+    for (i = 0; i < STATES; ++i)
+      for (j = 0; j < STATES; ++j) P[s][place[i]][place[j]] = start_P[(s * STATES + i) * STATES + j];
   for (k = 0; k < count && code == DONE; ++k) {
     const double begin = k ? end[k - 1] : start, length = end[k] - begin;
     const int tried = length <= 10.0 * longest; /* else the weights know nothing of effects over such a time */
@@ -5181,15 +5384,15 @@ EXPORT int sweep(int count, double start, const double *end, const double *low, 
         unknown = asked_too_much(code, &done);
       }
       if (code != DONE) break;
-      forward(&g, C, P, P_next, result, inherited);
+      forward(&g, C, (const double (*)[COLUMNS][COLUMNS])P, P_next, result, inherited);
       carry_mean(&g, m, next);
       respond(C, direct, next, mean + k * RESPONSES);
-      weigh(C, &g, P_next, result, next, mean + k * RESPONSES, size, &weights);
+      weigh(C, &g, (const double (*)[COLUMNS][COLUMNS])P_next, result, next, mean + k * RESPONSES, size, &weights);
       code = sweep_segment(&f, begin, end[k], 0.1 * tolerance, MOST_STEPS, &weights, &step, &g, &done, &why, stop);
       if (code != DONE) break;
     }
-    forward(&g, C, P, P_next, result, inherited);
-    memcpy(P, P_next, SOURCES * STATES * STATES * sizeof(double));
+    forward(&g, C, (const double (*)[COLUMNS][COLUMNS])P, P_next, result, inherited);
+    memcpy(P, P_next, sizeof P);
     for (j = 0; j < COLUMNS; ++j) made = larger(j ? made : 0.0, g.error[j]);
     for (s = 0; s < SOURCES; ++s) {
       double worst = 0.0;
@@ -5215,9 +5418,12 @@ EXPORT int sweep(int count, double start, const double *end, const double *low, 
       for (s = 0; s < SOURCES; ++s)
         for (i = 0; i < STATES; ++i)
           for (j = 0; j < STATES; ++j) added[((k * SOURCES + s) * STATES + i) * STATES + j] = g.W[s][place[i]][place[j]];
-    if (length > 0.1 * longest) weigh(C, &g, P, result, m, mean + k * RESPONSES, size, &weights);
+    if (length > 0.1 * longest) weigh(C, &g, (const double (*)[COLUMNS][COLUMNS])P, result, m, mean + k * RESPONSES, size, &weights);
     longest = larger(longest, length);
   }
+  for (s = 0; s < SOURCES; ++s)
+    for (i = 0; i < STATES; ++i)
+      for (j = 0; j < STATES; ++j) start_P[(s * STATES + i) * STATES + j] = P[s][place[i]][place[j]];
   counters[0] = done.steps;
   counters[1] = done.rejected;
   counters[2] = done.evaluations;
@@ -5380,4 +5586,966 @@ EXPORT int mean_history(int count, double start, const double *end, const double
     respond(C, direct, x, outputs + (n + 1) * RESPONSES);
   }
   return DONE;
+}
+
+/* ---- The same segments on a given grid, by Gauss collocation with four stages, of order 8 ----
+ *
+ * Steps follow the slow, lightly damped roots alone: the formula is stable for every root that is, and keeps quadratic
+ * invariants, so that P = R P R' + sum h b_i g_i g_i' is itself the formula applied to the smooth covariance; the fast
+ * part of a column need not be accurate. Nothing is controlled here: who calls compares two grids.
+ *
+ * M = I - h (a x I) A of 8 steps is eliminated side by side, without exchanges, by the plan of codegen/nodes/elimination.py
+ * for the rows of a kind; then the adjoint goes back step by step: M' V = d a, a at the stages a' V / b, at the start of
+ * the step a + sum of V, because the d_i = (b a^-1)_i add up to nothing.
+ */
+
+#include <stdlib.h>
+
+enum { GAUSS = 4, SQUARE = GAUSS * GAUSS, SIDE = LANES, UNIT = -1 };
+enum { NEARLY_SINGULAR = TOO_MANY_STEPS + 1 };
+#define SINGULAR 1e-12
+
+static const double gauss_node[GAUSS] = { 0.06943184420297371, 0.33000947820757187, 0.6699905217924281, 0.9305681557970262 };
+static const double gauss_weight[GAUSS] = { 0.17392742256872679, 0.3260725774312732, 0.3260725774312732, 0.17392742256872679 };
+static const double gauss_end[GAUSS] = { -1.6407053217392273, 1.214393969798563, -1.214393969798571, 1.640705321739255 }; /* d */
+static const double gauss_matrix[SQUARE] = { 0.08696371128436346, 0.1881181174998681, 0.16719192197418864, 0.17748257225452202, -0.026604180084998798,
+  0.16303628871563655, 0.35395300603374436, 0.31344511474186953, 0.012627462689404725, -0.027880428602470902,
+  0.1630362887156362, 0.3526767575162709, -0.0035551496857956838, 0.0067355005945381585, -0.014190694931141033,
+  0.08696371128436373 }; /* a by columns */
+
+typedef double Eight __attribute__((vector_size(LANES * sizeof(double)))); /* of GCC and Clang */
+
+static inline Eight load_eight(const double *from) {
+  Eight x;
+  memcpy(&x, from, sizeof x);
+  return x;
+}
+
+static inline void store_eight(double *to, Eight x) { memcpy(to, &x, sizeof x); }
+
+#ifdef __clang__
+#define PICK(a, b, ...) __builtin_shufflevector(a, b, __VA_ARGS__)
+#else
+typedef long long Places __attribute__((vector_size(LANES * sizeof(long long))));
+#define PICK(a, b, ...) __builtin_shuffle(a, b, (Places){ __VA_ARGS__ })
+#endif
+
+/* to[j][i] = from[i][j], eight by eight; rows of `to` are `apart` numbers apart */
+static inline void transpose_eight(const Eight *restrict from, double *restrict to, const long apart) {
+  const Eight p0 = PICK(from[0], from[1], 0, 8, 2, 10, 4, 12, 6, 14), p1 = PICK(from[0], from[1], 1, 9, 3, 11, 5, 13, 7, 15);
+  const Eight p2 = PICK(from[2], from[3], 0, 8, 2, 10, 4, 12, 6, 14), p3 = PICK(from[2], from[3], 1, 9, 3, 11, 5, 13, 7, 15);
+  const Eight p4 = PICK(from[4], from[5], 0, 8, 2, 10, 4, 12, 6, 14), p5 = PICK(from[4], from[5], 1, 9, 3, 11, 5, 13, 7, 15);
+  const Eight p6 = PICK(from[6], from[7], 0, 8, 2, 10, 4, 12, 6, 14), p7 = PICK(from[6], from[7], 1, 9, 3, 11, 5, 13, 7, 15);
+  const Eight q0 = PICK(p0, p2, 0, 1, 8, 9, 4, 5, 12, 13), q2 = PICK(p0, p2, 2, 3, 10, 11, 6, 7, 14, 15);
+  const Eight q1 = PICK(p1, p3, 0, 1, 8, 9, 4, 5, 12, 13), q3 = PICK(p1, p3, 2, 3, 10, 11, 6, 7, 14, 15);
+  const Eight q4 = PICK(p4, p6, 0, 1, 8, 9, 4, 5, 12, 13), q6 = PICK(p4, p6, 2, 3, 10, 11, 6, 7, 14, 15);
+  const Eight q5 = PICK(p5, p7, 0, 1, 8, 9, 4, 5, 12, 13), q7 = PICK(p5, p7, 2, 3, 10, 11, 6, 7, 14, 15);
+  store_eight(to + 0 * apart, PICK(q0, q4, 0, 1, 2, 3, 8, 9, 10, 11));
+  store_eight(to + 4 * apart, PICK(q0, q4, 4, 5, 6, 7, 12, 13, 14, 15));
+  store_eight(to + 1 * apart, PICK(q1, q5, 0, 1, 2, 3, 8, 9, 10, 11));
+  store_eight(to + 5 * apart, PICK(q1, q5, 4, 5, 6, 7, 12, 13, 14, 15));
+  store_eight(to + 2 * apart, PICK(q2, q6, 0, 1, 2, 3, 8, 9, 10, 11));
+  store_eight(to + 6 * apart, PICK(q2, q6, 4, 5, 6, 7, 12, 13, 14, 15));
+  store_eight(to + 3 * apart, PICK(q3, q7, 0, 1, 2, 3, 8, 9, 10, 11));
+  store_eight(to + 7 * apart, PICK(q3, q7, 4, 5, 6, 7, 12, 13, 14, 15));
+}
+
+/* own = d x - sum of F' y over listed blocks, on the way down the pivots; 1 blocks of columns */
+static inline void down_1(const double *restrict F, const int *restrict block, const int *restrict state, const int first, const int last,
+                          const double *X, const int width, double *restrict x, double *own) {
+  int l;
+  Eight a0_0 = gauss_end[0] * load_eight(x + 0);
+  Eight a1_0 = gauss_end[1] * load_eight(x + 0);
+  Eight a2_0 = gauss_end[2] * load_eight(x + 0);
+  Eight a3_0 = gauss_end[3] * load_eight(x + 0);
+  for (l = first; l < last; ++l) {
+    const double *f = F + SQUARE * block[l], *y = X + GAUSS * width * state[l];
+    {
+      const Eight y0 = load_eight(y + 0 * width + 0);
+      a0_0 -= f[0] * y0;
+      a1_0 -= f[4] * y0;
+      a2_0 -= f[8] * y0;
+      a3_0 -= f[12] * y0;
+    }
+    {
+      const Eight y0 = load_eight(y + 1 * width + 0);
+      a0_0 -= f[1] * y0;
+      a1_0 -= f[5] * y0;
+      a2_0 -= f[9] * y0;
+      a3_0 -= f[13] * y0;
+    }
+    {
+      const Eight y0 = load_eight(y + 2 * width + 0);
+      a0_0 -= f[2] * y0;
+      a1_0 -= f[6] * y0;
+      a2_0 -= f[10] * y0;
+      a3_0 -= f[14] * y0;
+    }
+    {
+      const Eight y0 = load_eight(y + 3 * width + 0);
+      a0_0 -= f[3] * y0;
+      a1_0 -= f[7] * y0;
+      a2_0 -= f[11] * y0;
+      a3_0 -= f[15] * y0;
+    }
+  }
+  store_eight(own + 0 * width + 0, a0_0);
+  store_eight(own + 1 * width + 0, a1_0);
+  store_eight(own + 2 * width + 0, a2_0);
+  store_eight(own + 3 * width + 0, a3_0);
+}
+
+/* own = inverse' (own - sum of F' y over listed blocks) on the way up, added to x; 1 blocks of columns */
+static inline void up_1(const double *restrict F, const int *restrict block, const int *restrict state, const int first, const int last,
+                          const double *X, const int width, double *restrict x, double *own, const double *inverse) {
+  int l;
+  Eight a0_0 = load_eight(own + 0 * width + 0);
+  Eight a1_0 = load_eight(own + 1 * width + 0);
+  Eight a2_0 = load_eight(own + 2 * width + 0);
+  Eight a3_0 = load_eight(own + 3 * width + 0);
+  for (l = first; l < last; ++l) {
+    const double *f = F + SQUARE * block[l], *y = X + GAUSS * width * state[l];
+    {
+      const Eight y0 = load_eight(y + 0 * width + 0);
+      a0_0 -= f[0] * y0;
+      a1_0 -= f[4] * y0;
+      a2_0 -= f[8] * y0;
+      a3_0 -= f[12] * y0;
+    }
+    {
+      const Eight y0 = load_eight(y + 1 * width + 0);
+      a0_0 -= f[1] * y0;
+      a1_0 -= f[5] * y0;
+      a2_0 -= f[9] * y0;
+      a3_0 -= f[13] * y0;
+    }
+    {
+      const Eight y0 = load_eight(y + 2 * width + 0);
+      a0_0 -= f[2] * y0;
+      a1_0 -= f[6] * y0;
+      a2_0 -= f[10] * y0;
+      a3_0 -= f[14] * y0;
+    }
+    {
+      const Eight y0 = load_eight(y + 3 * width + 0);
+      a0_0 -= f[3] * y0;
+      a1_0 -= f[7] * y0;
+      a2_0 -= f[11] * y0;
+      a3_0 -= f[15] * y0;
+    }
+  }
+  if (inverse) {
+    {
+      const Eight y0 = a0_0, y1 = a1_0, y2 = a2_0, y3 = a3_0;
+      a0_0 = (inverse[0] * y0 + inverse[1] * y1) + (inverse[2] * y2 + inverse[3] * y3);
+      a1_0 = (inverse[4] * y0 + inverse[5] * y1) + (inverse[6] * y2 + inverse[7] * y3);
+      a2_0 = (inverse[8] * y0 + inverse[9] * y1) + (inverse[10] * y2 + inverse[11] * y3);
+      a3_0 = (inverse[12] * y0 + inverse[13] * y1) + (inverse[14] * y2 + inverse[15] * y3);
+    }
+  }
+  store_eight(x + 0, load_eight(x + 0) + ((a0_0 + a1_0) + (a2_0 + a3_0)));
+  store_eight(own + 0 * width + 0, a0_0);
+  store_eight(own + 1 * width + 0, a1_0);
+  store_eight(own + 2 * width + 0, a2_0);
+  store_eight(own + 3 * width + 0, a3_0);
+}
+
+/* own = d x - sum of F' y over listed blocks, on the way down the pivots; 3 blocks of columns */
+static inline void down_3(const double *restrict F, const int *restrict block, const int *restrict state, const int first, const int last,
+                          const double *X, const int width, double *restrict x, double *own) {
+  int l;
+  Eight a0_0 = gauss_end[0] * load_eight(x + 0);
+  Eight a0_1 = gauss_end[0] * load_eight(x + 8);
+  Eight a0_2 = gauss_end[0] * load_eight(x + 16);
+  Eight a1_0 = gauss_end[1] * load_eight(x + 0);
+  Eight a1_1 = gauss_end[1] * load_eight(x + 8);
+  Eight a1_2 = gauss_end[1] * load_eight(x + 16);
+  Eight a2_0 = gauss_end[2] * load_eight(x + 0);
+  Eight a2_1 = gauss_end[2] * load_eight(x + 8);
+  Eight a2_2 = gauss_end[2] * load_eight(x + 16);
+  Eight a3_0 = gauss_end[3] * load_eight(x + 0);
+  Eight a3_1 = gauss_end[3] * load_eight(x + 8);
+  Eight a3_2 = gauss_end[3] * load_eight(x + 16);
+  for (l = first; l < last; ++l) {
+    const double *f = F + SQUARE * block[l], *y = X + GAUSS * width * state[l];
+    {
+      const Eight y0 = load_eight(y + 0 * width + 0);
+      const Eight y1 = load_eight(y + 0 * width + 8);
+      const Eight y2 = load_eight(y + 0 * width + 16);
+      a0_0 -= f[0] * y0;
+      a0_1 -= f[0] * y1;
+      a0_2 -= f[0] * y2;
+      a1_0 -= f[4] * y0;
+      a1_1 -= f[4] * y1;
+      a1_2 -= f[4] * y2;
+      a2_0 -= f[8] * y0;
+      a2_1 -= f[8] * y1;
+      a2_2 -= f[8] * y2;
+      a3_0 -= f[12] * y0;
+      a3_1 -= f[12] * y1;
+      a3_2 -= f[12] * y2;
+    }
+    {
+      const Eight y0 = load_eight(y + 1 * width + 0);
+      const Eight y1 = load_eight(y + 1 * width + 8);
+      const Eight y2 = load_eight(y + 1 * width + 16);
+      a0_0 -= f[1] * y0;
+      a0_1 -= f[1] * y1;
+      a0_2 -= f[1] * y2;
+      a1_0 -= f[5] * y0;
+      a1_1 -= f[5] * y1;
+      a1_2 -= f[5] * y2;
+      a2_0 -= f[9] * y0;
+      a2_1 -= f[9] * y1;
+      a2_2 -= f[9] * y2;
+      a3_0 -= f[13] * y0;
+      a3_1 -= f[13] * y1;
+      a3_2 -= f[13] * y2;
+    }
+    {
+      const Eight y0 = load_eight(y + 2 * width + 0);
+      const Eight y1 = load_eight(y + 2 * width + 8);
+      const Eight y2 = load_eight(y + 2 * width + 16);
+      a0_0 -= f[2] * y0;
+      a0_1 -= f[2] * y1;
+      a0_2 -= f[2] * y2;
+      a1_0 -= f[6] * y0;
+      a1_1 -= f[6] * y1;
+      a1_2 -= f[6] * y2;
+      a2_0 -= f[10] * y0;
+      a2_1 -= f[10] * y1;
+      a2_2 -= f[10] * y2;
+      a3_0 -= f[14] * y0;
+      a3_1 -= f[14] * y1;
+      a3_2 -= f[14] * y2;
+    }
+    {
+      const Eight y0 = load_eight(y + 3 * width + 0);
+      const Eight y1 = load_eight(y + 3 * width + 8);
+      const Eight y2 = load_eight(y + 3 * width + 16);
+      a0_0 -= f[3] * y0;
+      a0_1 -= f[3] * y1;
+      a0_2 -= f[3] * y2;
+      a1_0 -= f[7] * y0;
+      a1_1 -= f[7] * y1;
+      a1_2 -= f[7] * y2;
+      a2_0 -= f[11] * y0;
+      a2_1 -= f[11] * y1;
+      a2_2 -= f[11] * y2;
+      a3_0 -= f[15] * y0;
+      a3_1 -= f[15] * y1;
+      a3_2 -= f[15] * y2;
+    }
+  }
+  store_eight(own + 0 * width + 0, a0_0);
+  store_eight(own + 0 * width + 8, a0_1);
+  store_eight(own + 0 * width + 16, a0_2);
+  store_eight(own + 1 * width + 0, a1_0);
+  store_eight(own + 1 * width + 8, a1_1);
+  store_eight(own + 1 * width + 16, a1_2);
+  store_eight(own + 2 * width + 0, a2_0);
+  store_eight(own + 2 * width + 8, a2_1);
+  store_eight(own + 2 * width + 16, a2_2);
+  store_eight(own + 3 * width + 0, a3_0);
+  store_eight(own + 3 * width + 8, a3_1);
+  store_eight(own + 3 * width + 16, a3_2);
+}
+
+/* own = inverse' (own - sum of F' y over listed blocks) on the way up, added to x; 3 blocks of columns */
+static inline void up_3(const double *restrict F, const int *restrict block, const int *restrict state, const int first, const int last,
+                          const double *X, const int width, double *restrict x, double *own, const double *inverse) {
+  int l;
+  Eight a0_0 = load_eight(own + 0 * width + 0);
+  Eight a0_1 = load_eight(own + 0 * width + 8);
+  Eight a0_2 = load_eight(own + 0 * width + 16);
+  Eight a1_0 = load_eight(own + 1 * width + 0);
+  Eight a1_1 = load_eight(own + 1 * width + 8);
+  Eight a1_2 = load_eight(own + 1 * width + 16);
+  Eight a2_0 = load_eight(own + 2 * width + 0);
+  Eight a2_1 = load_eight(own + 2 * width + 8);
+  Eight a2_2 = load_eight(own + 2 * width + 16);
+  Eight a3_0 = load_eight(own + 3 * width + 0);
+  Eight a3_1 = load_eight(own + 3 * width + 8);
+  Eight a3_2 = load_eight(own + 3 * width + 16);
+  for (l = first; l < last; ++l) {
+    const double *f = F + SQUARE * block[l], *y = X + GAUSS * width * state[l];
+    {
+      const Eight y0 = load_eight(y + 0 * width + 0);
+      const Eight y1 = load_eight(y + 0 * width + 8);
+      const Eight y2 = load_eight(y + 0 * width + 16);
+      a0_0 -= f[0] * y0;
+      a0_1 -= f[0] * y1;
+      a0_2 -= f[0] * y2;
+      a1_0 -= f[4] * y0;
+      a1_1 -= f[4] * y1;
+      a1_2 -= f[4] * y2;
+      a2_0 -= f[8] * y0;
+      a2_1 -= f[8] * y1;
+      a2_2 -= f[8] * y2;
+      a3_0 -= f[12] * y0;
+      a3_1 -= f[12] * y1;
+      a3_2 -= f[12] * y2;
+    }
+    {
+      const Eight y0 = load_eight(y + 1 * width + 0);
+      const Eight y1 = load_eight(y + 1 * width + 8);
+      const Eight y2 = load_eight(y + 1 * width + 16);
+      a0_0 -= f[1] * y0;
+      a0_1 -= f[1] * y1;
+      a0_2 -= f[1] * y2;
+      a1_0 -= f[5] * y0;
+      a1_1 -= f[5] * y1;
+      a1_2 -= f[5] * y2;
+      a2_0 -= f[9] * y0;
+      a2_1 -= f[9] * y1;
+      a2_2 -= f[9] * y2;
+      a3_0 -= f[13] * y0;
+      a3_1 -= f[13] * y1;
+      a3_2 -= f[13] * y2;
+    }
+    {
+      const Eight y0 = load_eight(y + 2 * width + 0);
+      const Eight y1 = load_eight(y + 2 * width + 8);
+      const Eight y2 = load_eight(y + 2 * width + 16);
+      a0_0 -= f[2] * y0;
+      a0_1 -= f[2] * y1;
+      a0_2 -= f[2] * y2;
+      a1_0 -= f[6] * y0;
+      a1_1 -= f[6] * y1;
+      a1_2 -= f[6] * y2;
+      a2_0 -= f[10] * y0;
+      a2_1 -= f[10] * y1;
+      a2_2 -= f[10] * y2;
+      a3_0 -= f[14] * y0;
+      a3_1 -= f[14] * y1;
+      a3_2 -= f[14] * y2;
+    }
+    {
+      const Eight y0 = load_eight(y + 3 * width + 0);
+      const Eight y1 = load_eight(y + 3 * width + 8);
+      const Eight y2 = load_eight(y + 3 * width + 16);
+      a0_0 -= f[3] * y0;
+      a0_1 -= f[3] * y1;
+      a0_2 -= f[3] * y2;
+      a1_0 -= f[7] * y0;
+      a1_1 -= f[7] * y1;
+      a1_2 -= f[7] * y2;
+      a2_0 -= f[11] * y0;
+      a2_1 -= f[11] * y1;
+      a2_2 -= f[11] * y2;
+      a3_0 -= f[15] * y0;
+      a3_1 -= f[15] * y1;
+      a3_2 -= f[15] * y2;
+    }
+  }
+  if (inverse) {
+    {
+      const Eight y0 = a0_0, y1 = a1_0, y2 = a2_0, y3 = a3_0;
+      a0_0 = (inverse[0] * y0 + inverse[1] * y1) + (inverse[2] * y2 + inverse[3] * y3);
+      a1_0 = (inverse[4] * y0 + inverse[5] * y1) + (inverse[6] * y2 + inverse[7] * y3);
+      a2_0 = (inverse[8] * y0 + inverse[9] * y1) + (inverse[10] * y2 + inverse[11] * y3);
+      a3_0 = (inverse[12] * y0 + inverse[13] * y1) + (inverse[14] * y2 + inverse[15] * y3);
+    }
+    {
+      const Eight y0 = a0_1, y1 = a1_1, y2 = a2_1, y3 = a3_1;
+      a0_1 = (inverse[0] * y0 + inverse[1] * y1) + (inverse[2] * y2 + inverse[3] * y3);
+      a1_1 = (inverse[4] * y0 + inverse[5] * y1) + (inverse[6] * y2 + inverse[7] * y3);
+      a2_1 = (inverse[8] * y0 + inverse[9] * y1) + (inverse[10] * y2 + inverse[11] * y3);
+      a3_1 = (inverse[12] * y0 + inverse[13] * y1) + (inverse[14] * y2 + inverse[15] * y3);
+    }
+    {
+      const Eight y0 = a0_2, y1 = a1_2, y2 = a2_2, y3 = a3_2;
+      a0_2 = (inverse[0] * y0 + inverse[1] * y1) + (inverse[2] * y2 + inverse[3] * y3);
+      a1_2 = (inverse[4] * y0 + inverse[5] * y1) + (inverse[6] * y2 + inverse[7] * y3);
+      a2_2 = (inverse[8] * y0 + inverse[9] * y1) + (inverse[10] * y2 + inverse[11] * y3);
+      a3_2 = (inverse[12] * y0 + inverse[13] * y1) + (inverse[14] * y2 + inverse[15] * y3);
+    }
+  }
+  store_eight(x + 0, load_eight(x + 0) + ((a0_0 + a1_0) + (a2_0 + a3_0)));
+  store_eight(x + 8, load_eight(x + 8) + ((a0_1 + a1_1) + (a2_1 + a3_1)));
+  store_eight(x + 16, load_eight(x + 16) + ((a0_2 + a1_2) + (a2_2 + a3_2)));
+  store_eight(own + 0 * width + 0, a0_0);
+  store_eight(own + 0 * width + 8, a0_1);
+  store_eight(own + 0 * width + 16, a0_2);
+  store_eight(own + 1 * width + 0, a1_0);
+  store_eight(own + 1 * width + 8, a1_1);
+  store_eight(own + 1 * width + 16, a1_2);
+  store_eight(own + 2 * width + 0, a2_0);
+  store_eight(own + 2 * width + 8, a2_1);
+  store_eight(own + 2 * width + 16, a2_2);
+  store_eight(own + 3 * width + 0, a3_0);
+  store_eight(own + 3 * width + 8, a3_1);
+  store_eight(own + 3 * width + 16, a3_2);
+}
+
+static inline Eight positive(Eight x) {
+  Eight y;
+  int l;
+  for (l = 0; l < LANES; ++l) y[l] = fabs(x[l]);
+  return y;
+}
+
+/* Replace blocks side by side by their inverses, from minors of two rows; return whether all are far from singular. */
+static int invert(Eight *restrict d) {
+  const Eight a0 = d[0], a1 = d[1], a2 = d[2], a3 = d[3], b0 = d[4], b1 = d[5], b2 = d[6], b3 = d[7];
+  const Eight c0 = d[8], c1 = d[9], c2 = d[10], c3 = d[11], e0 = d[12], e1 = d[13], e2 = d[14], e3 = d[15];
+  const Eight u0 = a0 * b1 - b0 * a1, u1 = a0 * b2 - b0 * a2, u2 = a0 * b3 - b0 * a3;
+  const Eight u3 = a1 * b2 - b1 * a2, u4 = a1 * b3 - b1 * a3, u5 = a2 * b3 - b2 * a3;
+  const Eight l0 = c0 * e1 - e0 * c1, l1 = c0 * e2 - e0 * c2, l2 = c0 * e3 - e0 * c3;
+  const Eight l3 = c1 * e2 - e1 * c2, l4 = c1 * e3 - e1 * c3, l5 = c2 * e3 - e2 * c3;
+  const Eight determinant = u0 * l5 - u1 * l4 + u2 * l3 + u3 * l2 - u4 * l1 + u5 * l0, r = 1.0 / determinant;
+  const Eight size = positive(u0 * l5) + positive(u1 * l4) + positive(u2 * l3) + positive(u3 * l2) + positive(u4 * l1) + positive(u5 * l0);
+  int l, regular = 1;
+  d[0] = (b1 * l5 - b2 * l4 + b3 * l3) * r;
+  d[1] = (a2 * l4 - a1 * l5 - a3 * l3) * r;
+  d[2] = (e1 * u5 - e2 * u4 + e3 * u3) * r;
+  d[3] = (c2 * u4 - c1 * u5 - c3 * u3) * r;
+  d[4] = (b2 * l2 - b0 * l5 - b3 * l1) * r;
+  d[5] = (a0 * l5 - a2 * l2 + a3 * l1) * r;
+  d[6] = (e2 * u2 - e0 * u5 - e3 * u1) * r;
+  d[7] = (c0 * u5 - c2 * u2 + c3 * u1) * r;
+  d[8] = (b0 * l4 - b1 * l2 + b3 * l0) * r;
+  d[9] = (a1 * l2 - a0 * l4 - a3 * l0) * r;
+  d[10] = (e0 * u4 - e1 * u2 + e3 * u0) * r;
+  d[11] = (c1 * u2 - c0 * u4 - c3 * u0) * r;
+  d[12] = (b1 * l1 - b0 * l3 - b2 * l0) * r;
+  d[13] = (a0 * l3 - a1 * l1 + a2 * l0) * r;
+  d[14] = (e1 * u1 - e0 * u3 - e2 * u0) * r;
+  d[15] = (c0 * u3 - c1 * u1 + c2 * u0) * r;
+  for (l = 0; l < LANES; ++l) regular &= fabs(determinant[l]) > SINGULAR * size[l];
+  return regular;
+}
+
+/* to -= below right, or right = below right with `only`, of blocks side by side */
+static inline void multiply_blocks(const Eight *restrict below, const Eight *right, Eight *to, const int only) {
+  int k;
+  for (k = 0; k < SQUARE; k += GAUSS) {
+    const Eight x0 = right[k], x1 = right[k + 1], x2 = right[k + 2], x3 = right[k + 3];
+    {
+      const Eight sum = (below[0] * x0 + below[4] * x1) + (below[8] * x2 + below[12] * x3);
+      to[k + 0] = only ? sum : to[k + 0] - sum;
+    }
+    {
+      const Eight sum = (below[1] * x0 + below[5] * x1) + (below[9] * x2 + below[13] * x3);
+      to[k + 1] = only ? sum : to[k + 1] - sum;
+    }
+    {
+      const Eight sum = (below[2] * x0 + below[6] * x1) + (below[10] * x2 + below[14] * x3);
+      to[k + 2] = only ? sum : to[k + 2] - sum;
+    }
+    {
+      const Eight sum = (below[3] * x0 + below[7] * x1) + (below[11] * x2 + below[15] * x3);
+      to[k + 3] = only ? sum : to[k + 3] - sum;
+    }
+  }
+}
+
+/* Kind 0: 35 states, 252 blocks */
+static const int pivot_0[35] = { 33, 34, 3, 5, 22, 24, 26, 4, 6, 13, 14, 15, 8, 20, 25, 23, 21, 1, 9, 10, 27, 28, 29, 30, 31, 32, 19, 7, 0, 2,
+  11, 12, 16, 17, 18 };
+static const int diagonal_0[35] = { 0, 1, -1, -1, -1, -1, -1, 3, 5, -1, -1, -1, 10, -1, 12, 14, 16, -1, -1, -1, 17, 19, 21, -1, 23, 26, 34, 39, 55,
+  73, 95, 118, 142, 167, 193 };
+static const int entry_block_0[226] = { 55, 72, 93, 115, 138, 162, 187, 44, 61, 241, 82, 104, 127, 151, 176, 217, 238, 2, 6, 251, 3, 4, 7, 250, 5, 54,
+  71, 230, 92, 114, 137, 161, 186, 35, 10, 45, 62, 242, 83, 105, 128, 152, 177, 46, 63, 243, 84, 106, 129, 153,
+  178, 239, 216, 95, 117, 140, 164, 189, 240, 215, 200, 118, 141, 165, 190, 76, 98, 121, 145, 170, 77, 99, 122,
+  146, 171, 78, 100, 123, 147, 172, 201, 197, 237, 142, 166, 191, 202, 198, 236, 195, 167, 192, 203, 199, 235,
+  196, 194, 193, 53, 70, 91, 113, 136, 160, 185, 34, 221, 218, 248, 27, 43, 60, 81, 103, 126, 150, 175, 16, 249,
+  219, 246, 15, 42, 59, 80, 102, 125, 149, 174, 14, 247, 220, 244, 13, 41, 58, 79, 101, 124, 148, 173, 12, 245,
+  11, 47, 64, 85, 107, 130, 154, 179, 28, 222, 17, 18, 48, 65, 86, 108, 131, 155, 180, 29, 223, 214, 19, 20, 49,
+  66, 87, 109, 132, 156, 181, 30, 224, 213, 21, 50, 67, 88, 110, 133, 157, 182, 31, 225, 22, 24, 51, 68, 89, 111,
+  134, 158, 183, 32, 226, 212, 23, 25, 52, 69, 90, 112, 135, 159, 184, 33, 227, 26, 40, 56, 74, 96, 119, 143, 168,
+  0, 57, 75, 97, 120, 144, 169, 1 };
+static const int right_start_0[36] = { 0, 0, 0, 1, 2, 4, 6, 8, 11, 14, 15, 16, 17, 24, 31, 32, 33, 34, 35, 36, 37, 38, 39, 39, 40, 40, 40, 40, 43, 46,
+  48, 52, 55, 57, 58, 58 };
+static const int right_block_0[58] = { 251, 250, 248, 249, 246, 247, 244, 245, 241, 242, 243, 238, 239, 240, 237, 236, 235, 228, 229, 230, 231, 232,
+  233, 234, 221, 222, 223, 224, 225, 226, 227, 220, 219, 218, 217, 216, 215, 214, 213, 212, 209, 210, 211, 206,
+  207, 208, 204, 205, 200, 201, 202, 203, 197, 198, 199, 195, 196, 194 };
+static const int above_start_0[36] = { 0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 2, 2, 2, 2, 2, 3, 6, 9, 11, 13, 15, 16, 18, 20, 21, 23, 24, 27, 28, 28, 33, 39,
+  46, 49, 53, 58 };
+static const int above_state_0[58] = { 3, 5, 26, 24, 26, 25, 22, 24, 23, 4, 8, 4, 8, 4, 8, 20, 20, 27, 20, 28, 20, 20, 30, 20, 22, 20, 21, 8, 6, 8, 1,
+  7, 0, 6, 8, 9, 7, 0, 2, 6, 8, 10, 7, 0, 2, 11, 13, 11, 12, 14, 11, 12, 16, 15, 11, 12, 16, 17 };
+static const int above_block_0[58] = { 251, 250, 245, 247, 244, 220, 249, 246, 219, 241, 228, 242, 231, 243, 232, 222, 223, 214, 224, 213, 225, 226,
+  212, 227, 248, 221, 218, 230, 238, 229, 217, 209, 206, 239, 233, 216, 210, 207, 204, 240, 234, 215, 211, 208,
+  205, 200, 237, 201, 197, 236, 202, 198, 195, 235, 203, 199, 196, 194 };
+static const int below_start_0[36] = { 0, 7, 13, 15, 17, 18, 19, 20, 21, 22, 27, 32, 37, 38, 39, 46, 53, 60, 68, 76, 84, 93, 102, 110, 120, 129, 137,
+  144, 151, 157, 162, 166, 169, 171, 172, 172 };
+static const int below_state_0[172] = { 0, 2, 11, 12, 16, 17, 18, 2, 11, 12, 16, 17, 18, 4, 8, 6, 8, 21, 23, 25, 8, 8, 11, 12, 16, 17, 18, 11, 12, 16,
+  17, 18, 11, 12, 16, 17, 18, 7, 19, 0, 2, 11, 12, 16, 17, 18, 0, 2, 11, 12, 16, 17, 18, 0, 2, 11, 12, 16, 17, 18,
+  0, 2, 7, 11, 12, 16, 17, 18, 0, 2, 7, 11, 12, 16, 17, 18, 0, 2, 7, 11, 12, 16, 17, 18, 0, 2, 11, 12, 16, 17, 18,
+  19, 28, 0, 2, 11, 12, 16, 17, 18, 19, 29, 0, 2, 11, 12, 16, 17, 18, 19, 0, 2, 11, 12, 16, 17, 18, 19, 31, 32, 0,
+  2, 11, 12, 16, 17, 18, 19, 32, 0, 2, 11, 12, 16, 17, 18, 19, 0, 2, 11, 12, 16, 17, 18, 0, 2, 11, 12, 16, 17, 18,
+  2, 11, 12, 16, 17, 18, 11, 12, 16, 17, 18, 12, 16, 17, 18, 16, 17, 18, 17, 18, 18 };
+static const int below_block_0[172] = { 40, 56, 74, 96, 119, 143, 168, 57, 75, 97, 120, 144, 169, 2, 6, 4, 7, 15, 13, 11, 8, 9, 76, 98, 121, 145, 170,
+  77, 99, 122, 146, 171, 78, 100, 123, 147, 172, 35, 27, 41, 58, 79, 101, 124, 148, 173, 42, 59, 80, 102, 125,
+  149, 174, 43, 60, 81, 103, 126, 150, 175, 44, 61, 36, 82, 104, 127, 151, 176, 45, 62, 37, 83, 105, 128, 152,
+  177, 46, 63, 38, 84, 106, 129, 153, 178, 47, 64, 85, 107, 130, 154, 179, 28, 18, 48, 65, 86, 108, 131, 155, 180,
+  29, 20, 49, 66, 87, 109, 132, 156, 181, 30, 50, 67, 88, 110, 133, 157, 182, 31, 22, 24, 51, 68, 89, 111, 134,
+  158, 183, 32, 25, 52, 69, 90, 112, 135, 159, 184, 33, 53, 70, 91, 113, 136, 160, 185, 54, 71, 92, 114, 137, 161,
+  186, 72, 93, 115, 138, 162, 187, 94, 116, 139, 163, 188, 117, 140, 164, 189, 141, 165, 190, 166, 191, 192 };
+static const int entry_0[226] = { 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29,
+  30, 31, 32, 33, 34, 35, 36, 37, 38, 39, 40, 41, 42, 43, 44, 45, 46, 47, 48, 49, 50, 51, 52, 53, 54, 55, 56, 57,
+  58, 59, 60, 61, 62, 63, 64, 65, 66, 67, 68, 69, 70, 71, 72, 73, 74, 75, 76, 77, 78, 79, 80, 81, 82, 83, 84, 85,
+  86, 87, 88, 89, 90, 91, 92, 93, 94, 95, 96, 97, 98, 99, 100, 101, 102, 103, 104, 105, 106, 107, 108, 109, 110,
+  111, 112, 113, 114, 115, 116, 117, 118, 119, 120, 121, 122, 123, 124, 125, 126, 127, 128, 129, 130, 131, 132,
+  133, 134, 135, 136, 137, 138, 139, 140, 141, 142, 143, 144, 145, 146, 147, 148, 149, 150, 151, 152, 153, 154,
+  155, 156, 157, 158, 159, 160, 161, 162, 163, 164, 165, 166, 167, 168, 169, 170, 171, 172, 173, 174, 175, 176,
+  177, 178, 179, 180, 181, 182, 183, 184, 185, 186, 187, 188, 189, 190, 191, 192, 193, 194, 195, 196, 197, 198,
+  199, 200, 201, 202, 203, 204, 205, 206, 207, 208, 209, 210, 211, 212, 213, 214, 215, 216, 217, 218, 219, 220,
+  221, 222, 223, 224, 225 };
+static const int target_0[197] = { 3, 8, 5, 9, 218, 16, 219, 14, 220, 12, 228, 231, 232, 229, 233, 234, 201, 197, 142, 166, 191, 202, 198, 195,
+  167, 192, 203, 199, 196, 194, 193, 36, 209, 39, 37, 38, 210, 211, 34, 28, 29, 30, 31, 32, 33, 42, 59, 80, 102,
+  125, 149, 174, 43, 60, 81, 103, 126, 150, 175, 53, 70, 91, 113, 136, 160, 185, 206, 73, 209, 94, 116, 139, 163,
+  188, 207, 204, 210, 95, 117, 140, 164, 189, 208, 205, 211, 200, 118, 141, 165, 190, 48, 65, 86, 108, 131, 155,
+  180, 29, 19, 49, 66, 87, 109, 132, 156, 181, 30, 21, 51, 68, 89, 111, 134, 158, 183, 32, 23, 25, 206, 207, 208,
+  73, 204, 205, 94, 95, 200, 116, 117, 118, 139, 140, 141, 163, 164, 165, 188, 189, 190, 73, 204, 205, 94, 95,
+  200, 116, 117, 118, 139, 140, 141, 163, 164, 165, 188, 189, 190, 95, 200, 117, 118, 140, 141, 164, 165, 189,
+  190, 118, 197, 198, 199, 141, 142, 195, 196, 165, 166, 167, 194, 190, 191, 192, 193, 142, 195, 196, 166, 167,
+  194, 191, 192, 193, 167, 194, 192, 193, 193 };
+
+static int factorise_0(const Matrices *restrict m, const double *restrict h, Eight *restrict N) {
+  const int *target = target_0;
+  const Eight steps = load_eight(h);
+  int e, i, k, s, u, pivot;
+  memset(N, 0, 252 * SQUARE * sizeof *N);
+  for (e = 0; e < 226; ++e)
+    for (k = 0; k < GAUSS; ++k) {
+      const Eight entry = -steps * load_eight(m[k].A[entry_0[e]]);
+      for (s = 0; s < GAUSS; ++s) N[SQUARE * entry_block_0[e] + GAUSS * k + s] = gauss_matrix[GAUSS * k + s] * entry;
+    }
+  for (i = 0; i < 35; ++i)
+    for (s = 0; s < SQUARE && diagonal_0[i] != UNIT; s += GAUSS + 1) N[SQUARE * diagonal_0[i] + s] += 1.0;
+  for (pivot = 0; pivot < 35; ++pivot) {
+    if (diagonal_0[pivot] != UNIT) {
+      Eight *own = N + SQUARE * diagonal_0[pivot];
+      if (!invert(own)) return 0;
+      for (u = right_start_0[pivot]; u < right_start_0[pivot + 1]; ++u) {
+        Eight *block = N + SQUARE * right_block_0[u];
+        multiply_blocks(own, block, block, 1);
+      }
+    }
+    for (i = below_start_0[pivot]; i < below_start_0[pivot + 1]; ++i)
+      for (u = right_start_0[pivot]; u < right_start_0[pivot + 1]; ++u)
+        multiply_blocks(N + SQUARE * below_block_0[i], N + SQUARE * right_block_0[u], N + SQUARE * *target++, 0);
+  }
+  return 1;
+}
+
+/* One step back with columns x of kind 0; F its factors, `lane` its place in m */
+static void step_on_grid_0(const double *restrict F, const Matrices *restrict m, const int lane, double (*restrict x)[24],
+                            double (*restrict X)[GAUSS][24], double (*restrict noise)[GAUSS][COLUMNS], double (*restrict known)[COLUMNS]) {
+  enum { WIDTH = 24 };
+  int i, c;
+  {
+    double *at = X[0][0] + 0, *start = x[0] + 0;
+    for (i = 0; i < 35; ++i) {
+      const int own = pivot_0[i];
+      down_3(F, above_block_0, above_state_0, above_start_0[i], above_start_0[i + 1], at, WIDTH, start + WIDTH * own, at + GAUSS * WIDTH * own);
+    }
+    for (i = 34; i >= 0; --i) {
+      const int own = pivot_0[i], diagonal = diagonal_0[i];
+      up_3(F, below_block_0, below_state_0, below_start_0[i], below_start_0[i + 1], at, WIDTH, start + WIDTH * own, at + GAUSS * WIDTH * own,
+         diagonal == UNIT ? (const double *)0 : F + SQUARE * diagonal);
+    }
+  }
+  for (i = 0; i < GAUSS; ++i) {
+    const double inverse = 1.0 / gauss_weight[i];
+    const double a0 = inverse * gauss_matrix[GAUSS * i], a1 = inverse * gauss_matrix[GAUSS * i + 1], a2 = inverse * gauss_matrix[GAUSS * i + 2], a3 = inverse * gauss_matrix[GAUSS * i + 3];
+    for (c = 0; c < WIDTH; ++c) {
+      const double y0 = a0 * X[0][0][c] + a1 * X[0][1][c] + a2 * X[0][2][c] + a3 * X[0][3][c];
+      const double y2 = a0 * X[2][0][c] + a1 * X[2][1][c] + a2 * X[2][2][c] + a3 * X[2][3][c];
+      const double y11 = a0 * X[11][0][c] + a1 * X[11][1][c] + a2 * X[11][2][c] + a3 * X[11][3][c];
+      const double y12 = a0 * X[12][0][c] + a1 * X[12][1][c] + a2 * X[12][2][c] + a3 * X[12][3][c];
+      const double y16 = a0 * X[16][0][c] + a1 * X[16][1][c] + a2 * X[16][2][c] + a3 * X[16][3][c];
+      const double y17 = a0 * X[17][0][c] + a1 * X[17][1][c] + a2 * X[17][2][c] + a3 * X[17][3][c];
+      const double y18 = a0 * X[18][0][c] + a1 * X[18][1][c] + a2 * X[18][2][c] + a3 * X[18][3][c];
+      const double y19 = a0 * X[19][0][c] + a1 * X[19][1][c] + a2 * X[19][2][c] + a3 * X[19][3][c];
+      const double y20 = a0 * X[20][0][c] + a1 * X[20][1][c] + a2 * X[20][2][c] + a3 * X[20][3][c];
+      const double y27 = a0 * X[27][0][c] + a1 * X[27][1][c] + a2 * X[27][2][c] + a3 * X[27][3][c];
+      const double y28 = a0 * X[28][0][c] + a1 * X[28][1][c] + a2 * X[28][2][c] + a3 * X[28][3][c];
+      const double y29 = a0 * X[29][0][c] + a1 * X[29][1][c] + a2 * X[29][2][c] + a3 * X[29][3][c];
+      const double y31 = a0 * X[31][0][c] + a1 * X[31][1][c] + a2 * X[31][2][c] + a3 * X[31][3][c];
+      const double y33 = a0 * X[33][0][c] + a1 * X[33][1][c] + a2 * X[33][2][c] + a3 * X[33][3][c];
+      const double y34 = a0 * X[34][0][c] + a1 * X[34][1][c] + a2 * X[34][2][c] + a3 * X[34][3][c];
+      noise[0][i][0 + c] = m[i].B[0][lane] * y29;
+      noise[1][i][0 + c] = m[i].B[1][lane] * y27 + m[i].B[2][lane] * y28;
+      noise[2][i][0 + c] = m[i].B[3][lane] * y31;
+      noise[3][i][0 + c] = m[i].B[4][lane] * y33;
+      noise[4][i][0 + c] = m[i].B[5][lane] * y34;
+      known[i][0 + c] = m[i].known[0][lane] * y0 + m[i].known[1][lane] * y2 + m[i].known[2][lane] * y11 + m[i].known[3][lane] * y12 + m[i].known[4][lane] * y16 + m[i].known[5][lane] * y17 + m[i].known[6][lane] * y18 + m[i].known[7][lane] * y19 + m[i].known[8][lane] * y20;
+    }
+    (void)a0; (void)a1; (void)a2; (void)a3;
+  }
+  (void)m; (void)lane; (void)noise;
+}
+
+/* Kind 1: 11 states, 36 blocks */
+static const int pivot_1[11] = { 10, 2, 3, 4, 5, 6, 0, 1, 9, 7, 8 };
+static const int diagonal_1[11] = { 0, 1, 3, 4, 6, 8, 12, 17, 18, -1, 20 };
+static const int entry_block_1[34] = { 12, 16, 34, 33, 27, 1, 2, 35, 9, 13, 4, 5, 10, 14, 32, 6, 7, 11, 15, 31, 8, 28, 24, 19, 22, 29, 25, 21, 20, 23,
+  30, 26, 18, 0 };
+static const int right_start_1[12] = { 0, 0, 2, 3, 4, 5, 5, 9, 12, 14, 15, 15 };
+static const int right_block_1[15] = { 34, 35, 33, 32, 31, 27, 28, 29, 30, 24, 25, 26, 22, 23, 21 };
+static const int above_start_1[12] = { 0, 0, 0, 1, 1, 2, 3, 5, 6, 8, 11, 15 };
+static const int above_state_1[15] = { 2, 4, 5, 2, 3, 0, 0, 1, 0, 1, 9, 0, 1, 9, 7 };
+static const int above_block_1[15] = { 35, 32, 31, 34, 33, 27, 30, 26, 28, 24, 22, 29, 25, 23, 21 };
+static const int below_start_1[12] = { 0, 0, 1, 1, 4, 7, 9, 10, 10, 10, 11, 11 };
+static const int below_state_1[11] = { 3, 0, 1, 5, 0, 1, 6, 0, 1, 1, 8 };
+static const int below_block_1[11] = { 2, 9, 13, 5, 10, 14, 7, 11, 15, 16, 19 };
+static const int entry_1[34] = { 105, 106, 107, 108, 109, 117, 118, 121, 151, 152, 153, 154, 162, 163, 164, 165, 166, 174, 175, 176, 177, 185,
+  186, 187, 188, 196, 197, 198, 199, 200, 208, 209, 210, 225 };
+static const int target_1[13] = { 33, 3, 10, 14, 6, 11, 15, 8, 17, 24, 25, 26, 20 };
+
+static int factorise_1(const Matrices *restrict m, const double *restrict h, Eight *restrict N) {
+  const int *target = target_1;
+  const Eight steps = load_eight(h);
+  int e, i, k, s, u, pivot;
+  memset(N, 0, 36 * SQUARE * sizeof *N);
+  for (e = 0; e < 34; ++e)
+    for (k = 0; k < GAUSS; ++k) {
+      const Eight entry = -steps * load_eight(m[k].A[entry_1[e]]);
+      for (s = 0; s < GAUSS; ++s) N[SQUARE * entry_block_1[e] + GAUSS * k + s] = gauss_matrix[GAUSS * k + s] * entry;
+    }
+  for (i = 0; i < 11; ++i)
+    for (s = 0; s < SQUARE && diagonal_1[i] != UNIT; s += GAUSS + 1) N[SQUARE * diagonal_1[i] + s] += 1.0;
+  for (pivot = 0; pivot < 11; ++pivot) {
+    if (diagonal_1[pivot] != UNIT) {
+      Eight *own = N + SQUARE * diagonal_1[pivot];
+      if (!invert(own)) return 0;
+      for (u = right_start_1[pivot]; u < right_start_1[pivot + 1]; ++u) {
+        Eight *block = N + SQUARE * right_block_1[u];
+        multiply_blocks(own, block, block, 1);
+      }
+    }
+    for (i = below_start_1[pivot]; i < below_start_1[pivot + 1]; ++i)
+      for (u = right_start_1[pivot]; u < right_start_1[pivot + 1]; ++u)
+        multiply_blocks(N + SQUARE * below_block_1[i], N + SQUARE * right_block_1[u], N + SQUARE * *target++, 0);
+  }
+  return 1;
+}
+
+/* One step back with columns x of kind 1; F its factors, `lane` its place in m */
+static void step_on_grid_1(const double *restrict F, const Matrices *restrict m, const int lane, double (*restrict x)[8],
+                            double (*restrict X)[GAUSS][8], double (*restrict noise)[GAUSS][COLUMNS], double (*restrict known)[COLUMNS]) {
+  enum { WIDTH = 8 };
+  int i, c;
+  {
+    double *at = X[0][0] + 0, *start = x[0] + 0;
+    for (i = 0; i < 11; ++i) {
+      const int own = pivot_1[i];
+      down_1(F, above_block_1, above_state_1, above_start_1[i], above_start_1[i + 1], at, WIDTH, start + WIDTH * own, at + GAUSS * WIDTH * own);
+    }
+    for (i = 10; i >= 0; --i) {
+      const int own = pivot_1[i], diagonal = diagonal_1[i];
+      up_1(F, below_block_1, below_state_1, below_start_1[i], below_start_1[i + 1], at, WIDTH, start + WIDTH * own, at + GAUSS * WIDTH * own,
+         diagonal == UNIT ? (const double *)0 : F + SQUARE * diagonal);
+    }
+  }
+  for (i = 0; i < GAUSS; ++i) {
+    const double inverse = 1.0 / gauss_weight[i];
+    const double a0 = inverse * gauss_matrix[GAUSS * i], a1 = inverse * gauss_matrix[GAUSS * i + 1], a2 = inverse * gauss_matrix[GAUSS * i + 2], a3 = inverse * gauss_matrix[GAUSS * i + 3];
+    for (c = 0; c < WIDTH; ++c) {
+      const double y0 = a0 * X[0][0][c] + a1 * X[0][1][c] + a2 * X[0][2][c] + a3 * X[0][3][c];
+      const double y1 = a0 * X[1][0][c] + a1 * X[1][1][c] + a2 * X[1][2][c] + a3 * X[1][3][c];
+      const double y4 = a0 * X[4][0][c] + a1 * X[4][1][c] + a2 * X[4][2][c] + a3 * X[4][3][c];
+      const double y5 = a0 * X[5][0][c] + a1 * X[5][1][c] + a2 * X[5][2][c] + a3 * X[5][3][c];
+      const double y6 = a0 * X[6][0][c] + a1 * X[6][1][c] + a2 * X[6][2][c] + a3 * X[6][3][c];
+      const double y8 = a0 * X[8][0][c] + a1 * X[8][1][c] + a2 * X[8][2][c] + a3 * X[8][3][c];
+      const double y10 = a0 * X[10][0][c] + a1 * X[10][1][c] + a2 * X[10][2][c] + a3 * X[10][3][c];
+      noise[0][i][24 + c] = m[i].B[0][lane] * y6;
+      noise[1][i][24 + c] = m[i].B[1][lane] * y4 + m[i].B[2][lane] * y5;
+      noise[2][i][24 + c] = m[i].B[3][lane] * y8;
+      noise[4][i][24 + c] = m[i].B[5][lane] * y10;
+      known[i][24 + c] = m[i].known[7][lane] * y0 + m[i].known[8][lane] * y1;
+    }
+    (void)a0; (void)a1; (void)a2; (void)a3;
+  }
+  (void)m; (void)lane; (void)noise;
+}
+
+/* Kind 2: 3 states, 4 blocks */
+static const int pivot_2[3] = { 2, 0, 1 };
+static const int diagonal_2[3] = { 0, -1, 2 };
+static const int entry_block_2[4] = { 1, 3, 2, 0 };
+static const int right_start_2[4] = { 0, 0, 1, 1 };
+static const int right_block_2[1] = { 3 };
+static const int above_start_2[4] = { 0, 0, 0, 1 };
+static const int above_state_2[1] = { 0 };
+static const int above_block_2[1] = { 3 };
+static const int below_start_2[4] = { 0, 0, 1, 1 };
+static const int below_state_2[1] = { 1 };
+static const int below_block_2[1] = { 1 };
+static const int entry_2[4] = { 187, 198, 199, 218 };
+static const int target_2[1] = { 2 };
+
+static int factorise_2(const Matrices *restrict m, const double *restrict h, Eight *restrict N) {
+  const int *target = target_2;
+  const Eight steps = load_eight(h);
+  int e, i, k, s, u, pivot;
+  memset(N, 0, 4 * SQUARE * sizeof *N);
+  for (e = 0; e < 4; ++e)
+    for (k = 0; k < GAUSS; ++k) {
+      const Eight entry = -steps * load_eight(m[k].A[entry_2[e]]);
+      for (s = 0; s < GAUSS; ++s) N[SQUARE * entry_block_2[e] + GAUSS * k + s] = gauss_matrix[GAUSS * k + s] * entry;
+    }
+  for (i = 0; i < 3; ++i)
+    for (s = 0; s < SQUARE && diagonal_2[i] != UNIT; s += GAUSS + 1) N[SQUARE * diagonal_2[i] + s] += 1.0;
+  for (pivot = 0; pivot < 3; ++pivot) {
+    if (diagonal_2[pivot] != UNIT) {
+      Eight *own = N + SQUARE * diagonal_2[pivot];
+      if (!invert(own)) return 0;
+      for (u = right_start_2[pivot]; u < right_start_2[pivot + 1]; ++u) {
+        Eight *block = N + SQUARE * right_block_2[u];
+        multiply_blocks(own, block, block, 1);
+      }
+    }
+    for (i = below_start_2[pivot]; i < below_start_2[pivot + 1]; ++i)
+      for (u = right_start_2[pivot]; u < right_start_2[pivot + 1]; ++u)
+        multiply_blocks(N + SQUARE * below_block_2[i], N + SQUARE * right_block_2[u], N + SQUARE * *target++, 0);
+  }
+  return 1;
+}
+
+/* One step back with columns x of kind 2; F its factors, `lane` its place in m */
+static void step_on_grid_2(const double *restrict F, const Matrices *restrict m, const int lane, double (*restrict x)[8],
+                            double (*restrict X)[GAUSS][8], double (*restrict noise)[GAUSS][COLUMNS], double (*restrict known)[COLUMNS]) {
+  enum { WIDTH = 8 };
+  int i, c;
+  {
+    double *at = X[0][0] + 0, *start = x[0] + 0;
+    for (i = 0; i < 3; ++i) {
+      const int own = pivot_2[i];
+      down_1(F, above_block_2, above_state_2, above_start_2[i], above_start_2[i + 1], at, WIDTH, start + WIDTH * own, at + GAUSS * WIDTH * own);
+    }
+    for (i = 2; i >= 0; --i) {
+      const int own = pivot_2[i], diagonal = diagonal_2[i];
+      up_1(F, below_block_2, below_state_2, below_start_2[i], below_start_2[i + 1], at, WIDTH, start + WIDTH * own, at + GAUSS * WIDTH * own,
+         diagonal == UNIT ? (const double *)0 : F + SQUARE * diagonal);
+    }
+  }
+  for (i = 0; i < GAUSS; ++i) {
+    const double inverse = 1.0 / gauss_weight[i];
+    const double a0 = inverse * gauss_matrix[GAUSS * i], a1 = inverse * gauss_matrix[GAUSS * i + 1], a2 = inverse * gauss_matrix[GAUSS * i + 2], a3 = inverse * gauss_matrix[GAUSS * i + 3];
+    for (c = 0; c < WIDTH; ++c) {
+      const double y1 = a0 * X[1][0][c] + a1 * X[1][1][c] + a2 * X[1][2][c] + a3 * X[1][3][c];
+      const double y2 = a0 * X[2][0][c] + a1 * X[2][1][c] + a2 * X[2][2][c] + a3 * X[2][3][c];
+      noise[2][i][32 + c] = m[i].B[3][lane] * y1;
+      noise[3][i][32 + c] = m[i].B[4][lane] * y2;
+      known[i][32 + c] = 0.0;
+    }
+    (void)a0; (void)a1; (void)a2; (void)a3;
+  }
+  (void)m; (void)lane; (void)noise;
+}
+
+/* Add one step's integral of g g' of some noises to the upper blocks of W, four rows at a time. */
+static void add_products_on_grid(const double (*restrict noise)[GAUSS][COLUMNS], const double h, double (*restrict W)[COLUMNS], const int *restrict of) {
+  int r, c, j, n;
+  for (r = of[2]; r < of[3]; r += 4)
+    for (n = of[0]; n < of[0] + of[1]; ++n) {
+      const double (*restrict g)[COLUMNS] = noise[n];
+      double *restrict row0 = W[r + 0];
+      const double a0_0 = h * gauss_weight[0] * g[0][r + 0], a0_1 = h * gauss_weight[1] * g[1][r + 0], a0_2 = h * gauss_weight[2] * g[2][r + 0], a0_3 = h * gauss_weight[3] * g[3][r + 0];
+      double *restrict row1 = W[r + 1];
+      const double a1_0 = h * gauss_weight[0] * g[0][r + 1], a1_1 = h * gauss_weight[1] * g[1][r + 1], a1_2 = h * gauss_weight[2] * g[2][r + 1], a1_3 = h * gauss_weight[3] * g[3][r + 1];
+      double *restrict row2 = W[r + 2];
+      const double a2_0 = h * gauss_weight[0] * g[0][r + 2], a2_1 = h * gauss_weight[1] * g[1][r + 2], a2_2 = h * gauss_weight[2] * g[2][r + 2], a2_3 = h * gauss_weight[3] * g[3][r + 2];
+      double *restrict row3 = W[r + 3];
+      const double a3_0 = h * gauss_weight[0] * g[0][r + 3], a3_1 = h * gauss_weight[1] * g[1][r + 3], a3_2 = h * gauss_weight[2] * g[2][r + 3], a3_3 = h * gauss_weight[3] * g[3][r + 3];
+      for (c = of[4] > r / LANES * LANES ? of[4] : r / LANES * LANES; c < of[5]; c += LANES)
+        for (j = c; j < c + LANES; ++j) {
+          row0[j] += (a0_0 * g[0][j] + a0_1 * g[1][j]) + (a0_2 * g[2][j] + a0_3 * g[3][j]);
+          row1[j] += (a1_0 * g[0][j] + a1_1 * g[1][j]) + (a1_2 * g[2][j] + a1_3 * g[3][j]);
+          row2[j] += (a2_0 * g[0][j] + a2_1 * g[1][j]) + (a2_2 * g[2][j] + a2_3 * g[3][j]);
+          row3[j] += (a3_0 * g[0][j] + a3_1 * g[1][j]) + (a3_2 * g[2][j] + a3_3 * g[3][j]);
+        }
+    }
+}
+
+/* What a run on a grid needs, too much for the stack of a thread */
+typedef struct {
+  Eight N_0[252 * SQUARE];
+  double F_0[SIDE][252 * SQUARE];
+  double x_0[35][24], X_0[35][GAUSS][24];
+  Eight N_1[36 * SQUARE];
+  double F_1[SIDE][36 * SQUARE];
+  double x_1[11][8], X_1[11][GAUSS][8];
+  Eight N_2[4 * SQUARE];
+  double F_2[SIDE][4 * SQUARE];
+  double x_2[3][8], X_2[3][GAUSS][8];
+  double noise[NOISES_1][GAUSS][COLUMNS], known[GAUSS][COLUMNS];
+  double v[GAUSS][TABLE_VALUES_1][STAGES], t[GAUSS][1][STAGES], h[SIDE];
+  Matrices m[GAUSS];
+  Segment g;
+} OnGrid;
+
+/* Evaluate and eliminate `count` steps from edges[0] on, side by side; room that is left repeats the first. */
+static int factorise_steps(Flight *f, const double *edges, const int count, OnGrid *w) {
+  int i, j, k, n;
+  for (j = 0; j < STAGES; ++j) { /* the matrices have room for more than is eliminated */
+    const int of = j < count ? j : 0;
+    if (j < SIDE) w->h[j] = edges[of + 1] - edges[of];
+    for (i = 0; i < GAUSS; ++i) {
+      if (j < count) {
+        w->t[i][0][j] = smaller(larger(edges[j] + gauss_node[i] * (edges[j + 1] - edges[j]), f->low), f->high);
+        lookup(f, w->t[i][0][j], w->v[i], j);
+      } else {
+        w->t[i][0][j] = w->t[i][0][0];
+        for (k = 0; k < TABLE_VALUES; ++k) w->v[i][k][j] = w->v[i][k][0];
+      }
+    }
+  }
+  for (i = 0; i < GAUSS; ++i)
+    stage_matrices((const double (*)[STAGES])w->t[i], (const double (*)[STAGES])w->v[i], f->p, w->m[i].A, w->m[i].B, w->m[i].known);
+  if (!factorise_0(w->m, w->h, w->N_0)) return 0;
+  for (n = 0; n < 252 * SQUARE; n += LANES) transpose_eight(w->N_0 + n, w->F_0[0] + n, 252 * SQUARE);
+  if (!factorise_1(w->m, w->h, w->N_1)) return 0;
+  for (n = 0; n < 36 * SQUARE; n += LANES) transpose_eight(w->N_1 + n, w->F_1[0] + n, 36 * SQUARE);
+  if (!factorise_2(w->m, w->h, w->N_2)) return 0;
+  for (n = 0; n < 4 * SQUARE; n += LANES) transpose_eight(w->N_2 + n, w->F_2[0] + n, 4 * SQUARE);
+  return 1;
+}
+
+static int segment_on_grid(Flight *f, const double *edges, const int steps, OnGrid *w, Counters *done, Failure *why, const volatile int *stop) {
+  Segment *g = &w->g;
+  int i, j, k, last, first;
+  double sum = 0.0;
+  memset(g, 0, sizeof *g);
+  memset(w->noise, 0, sizeof w->noise);
+  memset(w->known, 0, sizeof w->known);
+  memset(w->x_0, 0, sizeof w->x_0);
+  w->x_0[0][0] = 1.0;
+  w->x_0[1][1] = 1.0;
+  w->x_0[2][2] = 1.0;
+  w->x_0[3][3] = 1.0;
+  w->x_0[4][4] = 1.0;
+  w->x_0[5][5] = 1.0;
+  w->x_0[6][6] = 1.0;
+  w->x_0[7][7] = 1.0;
+  w->x_0[8][8] = 1.0;
+  w->x_0[9][9] = 1.0;
+  w->x_0[10][10] = 1.0;
+  w->x_0[11][11] = 1.0;
+  w->x_0[12][12] = 1.0;
+  w->x_0[13][13] = 1.0;
+  w->x_0[14][14] = 1.0;
+  w->x_0[15][15] = 1.0;
+  w->x_0[16][16] = 1.0;
+  w->x_0[17][17] = 1.0;
+  w->x_0[18][18] = 1.0;
+  w->x_0[23][19] = 1.0;
+  w->x_0[24][20] = 1.0;
+  w->x_0[25][21] = 1.0;
+  w->x_0[26][22] = 1.0;
+  w->x_0[32][23] = 1.0;
+  memset(w->x_1, 0, sizeof w->x_1);
+  w->x_1[0][0] = 1.0;
+  w->x_1[1][1] = 1.0;
+  w->x_1[2][2] = 1.0;
+  w->x_1[3][3] = 1.0;
+  w->x_1[4][4] = 1.0;
+  w->x_1[5][5] = 1.0;
+  w->x_1[6][6] = 1.0;
+  w->x_1[10][7] = 1.0;
+  memset(w->x_2, 0, sizeof w->x_2);
+  w->x_2[0][0] = 1.0;
+  w->x_2[1][1] = 1.0;
+  w->x_2[2][2] = 1.0;
+  for (last = steps; last > 0; last = first) {
+    first = last > SIDE ? last - SIDE : 0;
+    if (*stop) return STOPPED;
+    why->time = edges[first];
+    if (!factorise_steps(f, edges + first, last - first, w)) {
+      for (i = 0; i < GAUSS; ++i) {
+        const int entry = not_finite(w->m + i, &j);
+        if (entry >= 0) {
+          why->time = w->t[i][0][j];
+          why->entry = entry;
+          return NOT_FINITE;
+        }
+      }
+      return NEARLY_SINGULAR;
+    }
+    done->evaluations += GAUSS * (last - first);
+    done->steps += last - first;
+    for (j = last - first - 1; j >= 0; --j) {
+      step_on_grid_0(w->F_0[j], w->m, j, w->x_0, w->X_0, w->noise, w->known);
+      step_on_grid_1(w->F_1[j], w->m, j, w->x_1, w->X_1, w->noise, w->known);
+      step_on_grid_2(w->F_2[j], w->m, j, w->x_2, w->X_2, w->noise, w->known);
+      for (i = 0; i < PRODUCTS; ++i)
+        add_products_on_grid((const double (*)[GAUSS][COLUMNS])w->noise, w->h[j], g->W[noise_source[product[i][0]]], product[i]);
+      for (i = 0; i < GAUSS; ++i)
+        for (k = 0; k < COLUMNS; ++k) g->z[k] += w->h[j] * gauss_weight[i] * w->known[i][k];
+    }
+  }
+  for (i = 0; i < 35; ++i) memcpy(g->transposed[row_0[i]] + 0 * LANES, w->x_0[i], sizeof w->x_0[i]);
+  for (i = 0; i < 11; ++i) memcpy(g->transposed[row_1[i]] + 3 * LANES, w->x_1[i], sizeof w->x_1[i]);
+  for (i = 0; i < 3; ++i) memcpy(g->transposed[row_2[i]] + 4 * LANES, w->x_2[i], sizeof w->x_2[i]);
+  for (k = 0; k < SOURCES; ++k)
+    for (i = 0; i < COLUMNS; ++i)
+      for (j = 0; j < i; ++j) g->W[k][i][j] = g->W[k][j][i];
+  for (i = 0; i < STATES; ++i)
+    for (j = 0; j < COLUMNS; ++j) sum += fabs(g->transposed[i][j]);
+  return isfinite(sum) ? DONE : OUT_OF_RANGE;
+}
+
+/* Sweep over `count` segments of which number k has steps[k] steps between `edges`; the rest as of sweep. */
+EXPORT int sweep_on_grid(int count, const double *end, const double *low, const double *high, const int *steps, const double *edges,
+                         const double *p, const double *tables, double *start_P, double *m, double *covariance, double *mean,
+                         double *transition, double *added, double *counters, double *failure, const volatile int *stop) {
+  double C[C_SIZE], direct[RESPONSES], next[STATES], P[SOURCES_1][COLUMNS][COLUMNS], P_next[SOURCES_1][COLUMNS][COLUMNS];
+  double inherited[SOURCES_1 * RESPONSES];
+  void *room = malloc(sizeof(OnGrid) + LANES * sizeof(double)); /* vectors want to stand on a multiple of their size */
+  OnGrid *w = (OnGrid *)(((size_t)room + LANES * sizeof(double) - 1) / (LANES * sizeof(double)) * (LANES * sizeof(double)));
+  Flight f;
+  Counters done = { 0.0, 0.0, 0.0 };
+  Failure why = { 0.0, -1.0 };
+  int i, j, s, k, code = room ? DONE : NEARLY_SINGULAR;
+  f.p = p;
+  f.tables = tables;
+  memset(f.piece, 0, sizeof f.piece);
+  memset(P, 0, sizeof P);
+  for (s = 0; s < SOURCES; ++s)
+    for (i = 0; i < STATES; ++i)
+      for (j = 0; j < STATES; ++j) P[s][place[i]][place[j]] = start_P[(s * STATES + i) * STATES + j];
+  for (k = 0; k < count && code == DONE; ++k) {
+    double *result = covariance + k * SOURCES * RESPONSES * RESPONSES;
+    f.low = low[k];
+    f.high = high[k];
+    code = segment_on_grid(&f, edges, steps[k], w, &done, &why, stop);
+    edges += steps[k];
+    if (code != DONE) break;
+    evaluate_output(&f, end[k], C, direct);
+    forward(&w->g, C, (const double (*)[COLUMNS][COLUMNS])P, P_next, result, inherited);
+    memcpy(P, P_next, sizeof P);
+    for (i = 0; i < SOURCES * RESPONSES * RESPONSES; ++i)
+      if (!(fabs(result[i]) <= 1e200)) {
+        why.time = end[k];
+        code = OUT_OF_RANGE;
+      }
+    carry_mean(&w->g, m, next);
+    memcpy(m, next, sizeof next);
+    respond(C, direct, m, mean + k * RESPONSES);
+    for (i = 0; i < RESPONSES; ++i)
+      if (!(fabs(mean[k * RESPONSES + i]) <= 1e200)) {
+        why.time = end[k];
+        code = OUT_OF_RANGE;
+      }
+    if (transition)
+      for (i = 0; i < STATES; ++i)
+        for (j = 0; j < STATES; ++j) transition[(k * STATES + i) * STATES + j] = w->g.transposed[j][place[i]];
+    if (added)
+      for (s = 0; s < SOURCES; ++s)
+        for (i = 0; i < STATES; ++i)
+          for (j = 0; j < STATES; ++j) added[((k * SOURCES + s) * STATES + i) * STATES + j] = w->g.W[s][place[i]][place[j]];
+  }
+  for (s = 0; s < SOURCES; ++s)
+    for (i = 0; i < STATES; ++i)
+      for (j = 0; j < STATES; ++j) start_P[(s * STATES + i) * STATES + j] = P[s][place[i]][place[j]];
+  free(room);
+  counters[0] = done.steps;
+  counters[1] = done.rejected;
+  counters[2] = done.evaluations;
+  failure[0] = why.time;
+  failure[1] = why.entry;
+  return code;
 }

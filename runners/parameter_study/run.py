@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Mapping
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -134,7 +134,7 @@ def run_parameter_study(
     try:
         quantities = resolve_quantities(study, plan)
         values = member_values(plan, quantities)
-        task = _task(study, plan, quantities)
+        task = replace(_task(study, plan, quantities), members=len(values))
         _check_size(study, task, len(values))
     except DataError as error:
         raise DataError(error.why, file=error.file or file, column=error.column) from None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -24,15 +25,20 @@ from ...codegen.toolchain.library import InterpreterWarning
 from ...model.errors import AscentwindError, IntegrationError, TimeRangeError
 from ...model.system.linear_system import LinearSystem
 from .cores import available_cores
+from .fixed_grid import LEAST_TOLERANCE as GRID_TOLERANCE
+from .fixed_grid import StepRule, step_rule
 from .mean_response import FillMeans, MeanResponse, Respond, with_mean_tables
 from .step_budget import at_most, check_explicit_steps, naming_fastest_root
 from .time_nodes import Interval, intervals, on_flight, same_time, time_nodes
 from .tolerances import check_relative_tolerance
 from .typical_sizes import mean_misjudged, misjudged, sizes_of_sweep
 
+log = logging.getLogger(__name__)
+
 LONGEST_SEGMENT = 1.0  # s; weights of the error control are renewed and the Gramians stay well scaled
 MOST_SEGMENTS = 5000  # for the sake of that, on a flight of hours or days
 LEAST_TOLERANCE = 1e-12
+MANY = 16  # sets of a batch, for which a grid is looked for
 MOST_STEPS = 100_000  # of SciPy's DOP853, where nothing is compiled
 
 
@@ -132,6 +138,7 @@ def sweep(
     longest_interval: float = float("inf"),
     weighting_spacing: float | None = None,
     responses: Sequence[str] | None = None,
+    rule: StepRule | None = None,
 ) -> SweepResult:
     """Sweep once over the flight for all end times.
 
@@ -150,6 +157,8 @@ def sweep(
         Keep the weighting functions at points at most this many seconds apart.
     responses : sequence of str, optional
         Those wanted; all are computed, and only these are refused where white noise reaches them directly.
+    rule : StepRule, optional
+        Of the steps of a grid, instead of steps that the tolerance controls; these follow where the grid fails.
 
     Raises
     ------
@@ -161,10 +170,10 @@ def sweep(
     longest = longest_segment(float(ends[-1] - system.start))
     longest = min(longest, longest_interval, weighting_spacing or longest)
     nodes = time_nodes(executable, ends)
-    # an end time at the start needs no integration, only a segment to read it in
-    last = nodes[-1] if nodes[-1] > system.start else min(system.end, system.start + longest)
-    segments = flight_segments(executable, (*np.unique(nodes[nodes < last]).tolist(), float(last)), longest)
-    result = swept(compiled, executable, segments, relative_tolerance, steps=weighting_spacing is not None)
+    segments = _segments_of(executable, nodes, longest)
+    result = None if rule is None or weighting_spacing is not None else _on_grid(compiled, executable, segments, rule)
+    if result is None:
+        result = swept(compiled, executable, segments, relative_tolerance, steps=weighting_spacing is not None)
     at = np.where(nodes > system.start, np.searchsorted(segments.end, nodes), -1)
     found = result.covariance[at], result.mean[at], result.error[at]
     if at[0] < 0:
@@ -174,6 +183,50 @@ def sweep(
     if result.transition is not None:
         weighting = _weighting_functions(executable, segments, at, result.transition)
     return SweepResult(ends, *found, result.counters, weighting)
+
+
+def _segments_of(executable: ExecutableSystem, nodes: NDArray[np.float64], longest: float) -> Segments:
+    """Return the segments to the last of the nodes of the end times."""
+    system = executable.system
+    # an end time at the start needs no integration, only a segment to read it in
+    last = nodes[-1] if nodes[-1] > system.start else min(system.end, system.start + longest)
+    return flight_segments(executable, (*np.unique(nodes[nodes < last]).tolist(), float(last)), longest)
+
+
+def _on_grid(
+    compiled: CompiledSweep, executable: ExecutableSystem, segments: Segments, rule: StepRule
+) -> SegmentResults | None:
+    """Sweep on a grid; None where that fails and controlled steps may not."""
+    try:
+        return rule.run(compiled, executable, segments)
+    except IntegrationError as error:
+        log.info("not on the grid: %s", error)
+        return None
+
+
+def rule_for(
+    compiled: CompiledSweep,
+    numbers: ExecutableSystem,
+    times: ArrayLike,
+    *,
+    relative_tolerance: float,
+    fill: FillMeans = with_mean_tables,
+) -> StepRule | None:
+    """Return the grid's rule for many sets of numbers like these; None where controlled steps serve them better.
+
+    It costs some three sweeps. Arguments as of :func:`sweep_member`.
+    """
+    system = compiled.system
+    if relative_tolerance < GRID_TOLERANCE or not compiled.takes_a_grid:
+        return None
+    try:
+        ends = check_times(system, times)
+        nominal = fill(numbers, forward_mean(compiled, 1e-2 * relative_tolerance))
+        segments = _segments_of(nominal, time_nodes(nominal, ends), longest_segment(float(ends[-1] - system.start)))
+        controlled = swept(compiled, nominal, segments, relative_tolerance, steps=False)
+        return step_rule(compiled, nominal, segments, relative_tolerance, controlled.counters["steps"])
+    except AscentwindError:
+        return None  # the members say what is wrong
 
 
 def longest_segment(flight: float) -> float:
@@ -245,6 +298,7 @@ def sweep_member(
     relative_tolerance: float,
     responses: Sequence[str] | None = None,
     fill: FillMeans = with_mean_tables,
+    rule: StepRule | None = None,
 ) -> SweepResult:
     """Sweep one set of numbers, its tables of the mean response made for it at a hundredth of the tolerance.
 
@@ -257,13 +311,15 @@ def sweep_member(
         As for :func:`sweep`.
     fill : callable
         Of a system and what computes its linear mean, that gives the system with its tables of the mean.
+    rule : StepRule, optional
+        As for :func:`sweep`.
 
     Raises
     ------
     TimeRangeError, DirectNoiseError, IntegrationError, DataError
     """
     member = fill(numbers, forward_mean(compiled, 1e-2 * relative_tolerance))
-    return sweep(compiled, member, times, relative_tolerance=relative_tolerance, responses=responses)
+    return sweep(compiled, member, times, relative_tolerance=relative_tolerance, responses=responses, rule=rule)
 
 
 def batch(
@@ -277,6 +333,9 @@ def batch(
     fill: FillMeans = with_mean_tables,
 ) -> list[SweepResult]:
     """Sweep many parameter sets, one after another on each of several threads.
+
+    Where there are enough of them, and it costs less, they share the rule of a grid (:class:`StepRule`), chosen on the
+    numbers of ``executable``.
 
     Parameters
     ----------
@@ -303,10 +362,14 @@ def batch(
     if not 1 <= threads <= cores:
         raise IntegrationError(f"{threads} threads were asked for and there are {cores} cores; choose 1 to {cores}")
 
+    rule = None
+    if len(parameter_sets) >= MANY:
+        rule = rule_for(compiled, executable, times, relative_tolerance=relative_tolerance, fill=fill)
+
     def one(values: NDArray[np.float64]) -> SweepResult | AscentwindError:
         try:
             member = executable.with_numbers(parameters=np.asarray(values, float))
-            return sweep_member(compiled, member, times, relative_tolerance=relative_tolerance, fill=fill)
+            return sweep_member(compiled, member, times, relative_tolerance=relative_tolerance, fill=fill, rule=rule)
         except AscentwindError as error:
             return error
 

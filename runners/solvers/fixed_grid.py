@@ -1,0 +1,143 @@
+"""A grid of steps for many sweeps of one system, chosen once on its nominal numbers: how many steps a second, and when.
+
+Steps of Gauss collocation follow the lightly damped roots alone, so that a fast, well damped root costs nothing. The
+rule is found by halving: what a grid and one twice as fine differ by is the error of the first. It serves every member
+of a study that has roots like the nominal ones; a member whose roots are faster takes as much finer a grid.
+"""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...codegen.sweep.integrator import CompiledSweep
+from ...codegen.sweep.segments import GridSteps, SegmentResults, Segments
+from ...codegen.system.executable import ExecutableSystem
+from ...model.errors import IntegrationError
+from .collocation_grid import LIGHT
+from .stability import matrices_at
+
+log = logging.getLogger(__name__)
+
+LEAST_TOLERANCE = 1e-6  # below, kinks between steps tell
+LOOKS = 13  # times at which the nominal roots are looked at
+WATCHED = 2  # those of them at which a member's are, where they are fastest
+FIRST_PHASE = 1.9  # rad a step at the tolerance of 1e-4, where the search begins
+ORDER = 8
+TRIES = 4
+MARGIN = 1.1  # for the error of the finer grid
+WORTH_IT = 1.1  # as long steps, for another try
+GAIN = 0.8  # steps of the rule, against those of the explicit formula, that are worth it
+
+
+@dataclass(frozen=True, eq=False)
+class StepRule:
+    """How fine a grid is.
+
+    Attributes
+    ----------
+    times : (k,) array
+        s.
+    rates : (k,) array
+        Steps a second there.
+    roots : (k,) array
+        The fastest lightly damped root there, rad/s.
+    error : float
+        Largest relative error of a standard deviation of the nominal numbers.
+    tolerance : float
+        That it was chosen for.
+    """
+
+    times: NDArray[np.float64]
+    rates: NDArray[np.float64]
+    roots: NDArray[np.float64]
+    error: float
+    tolerance: float
+
+    def steps(self, segments: Segments, finer: float = 1.0) -> GridSteps:
+        """Return the steps of segments, ``finer`` times as many a second."""
+        begin = np.concatenate([[segments.start], segments.end[:-1]])
+        rates = np.maximum(np.interp(begin, self.times, self.rates), np.interp(segments.end, self.times, self.rates))
+        counts = np.maximum(1, np.ceil((segments.end - begin) * rates * finer - 1e-9))
+        return GridSteps.equal(segments, counts.astype(np.intc))
+
+    def run(self, compiled: CompiledSweep, member: ExecutableSystem, segments: Segments) -> SegmentResults:
+        """Sweep a member on its grid, with the error that its roots let expect.
+
+        Raises
+        ------
+        IntegrationError, DataError
+        """
+        watched = np.argsort(-self.roots)[:WATCHED]
+        own = np.array([_light_root(member, float(time)) for time in self.times[watched]])
+        faster = float((own / self.roots[watched]).max(initial=1.0))
+        error, finer = self.error * faster**ORDER, 1.0
+        if error > self.tolerance:
+            finer = (error / self.tolerance) ** (1 / ORDER)
+            log.info("the grid is too coarse for a root of %.3g rad/s: %.2g times as many steps", own.max(), finer)
+        found = compiled.on_grid(member, segments, self.steps(segments, finer))
+        expected = np.full_like(found.error, error / finer**ORDER)
+        return replace(found, error=expected, counters={**found.counters, "refined": int(finer > 1.0)})
+
+
+def step_rule(
+    compiled: CompiledSweep, nominal: ExecutableSystem, segments: Segments, tolerance: float, explicit_steps: int
+) -> StepRule | None:
+    """Return the rule for a tolerance; None where explicit steps are no more, or no grid holds it.
+
+    Parameters
+    ----------
+    compiled : CompiledSweep
+    nominal : ExecutableSystem
+        With its tables of the mean response filled in.
+    segments : Segments
+    tolerance : float
+        Relative, of every standard deviation.
+    explicit_steps : int
+        Those of the explicit formula at the same tolerance.
+
+    Raises
+    ------
+    DataError
+    """
+    if tolerance < LEAST_TOLERANCE or not compiled.takes_a_grid:
+        return None
+    start, end = segments.start, float(segments.end[-1])
+    times = start + (end - start) * (np.arange(LOOKS) + 0.5) / LOOKS
+    roots = np.array([_light_root(nominal, float(time)) for time in times])
+    roots = np.maximum(roots, 1.0 / (end - start))
+    phase, found = FIRST_PHASE * (tolerance / 1e-4) ** (1 / ORDER), None
+    for _ in range(TRIES):
+        rule = StepRule(times, roots / phase, roots, 0.0, tolerance)
+        if rule.steps(segments).counts.sum() > GAIN * explicit_steps:
+            break
+        try:
+            grids = (rule.steps(segments, finer) for finer in (1.0, 2.0))
+            error = MARGIN * _apart(*(compiled.on_grid(nominal, segments, grid) for grid in grids))
+        except IntegrationError:
+            break
+        wanted = (0.4 * tolerance / max(error, 1e-3 * tolerance)) ** (1 / ORDER)
+        if error <= 0.5 * tolerance:
+            found = replace(rule, error=error)
+            if wanted < WORTH_IT:
+                break
+            phase *= min(wanted, 2.0)
+        elif found is not None:
+            break
+        else:
+            phase *= max(0.5, min(0.9, wanted))
+    return found
+
+
+def _light_root(executable: ExecutableSystem, time: float) -> float:
+    roots = np.linalg.eigvals(matrices_at(executable, time)["A"])
+    return float(np.abs(roots[-roots.real < LIGHT * np.abs(roots)]).max(initial=0.0))
+
+
+def _apart(coarse: SegmentResults, fine: SegmentResults) -> float:
+    """Return the largest relative difference of a standard deviation."""
+    a, b = (np.sqrt(np.maximum(np.einsum("ksrr->ksr", found.covariance), 0.0)) for found in (coarse, fine))
+    return float(np.abs(a / np.where(b > 0, b, 1.0) - 1.0)[b > 0].max(initial=0.0))
