@@ -506,6 +506,7 @@ class Study(Case):
         times: Iterable[float],
         *,
         responses: Iterable[str] | None = None,
+        direction: float | None = None,
     ) -> xr.Dataset:
         """Return what a discrete gust alone puts into responses, over time.
 
@@ -517,7 +518,9 @@ class Study(Case):
         times : iterable of float
             s; zero before the vehicle meets it.
         responses : iterable of str, optional
-            All without it.
+            All without it; in both planes resultants too.
+        direction : float, optional
+            Where it blows, rad from north towards east: of a vehicle in both planes, and of no other.
 
         Returns
         -------
@@ -526,9 +529,9 @@ class Study(Case):
 
         Raises
         ------
-        GustError, TimeRangeError, UnknownNameError, NoVehicleError, DataError, IntegrationError
+        GustError, TimeRangeError, UnknownNameError, ParameterValueError, NoVehicleError, DataError, IntegrationError
         """
-        return gust_response(self, gust, start_altitude, times, responses)
+        return gust_response(self, gust, start_altitude, times, responses, direction)
 
     def gust_sweep(
         self,
@@ -547,20 +550,21 @@ class Study(Case):
         times : iterable of float, optional
             End times t2, s; 21 of the vehicle's default times without it.
         responses : iterable of str, optional
-            All without it.
+            All without it; in both planes resultants too.
         lengths : iterable of float, optional
             m, along altitude; 60 to 300 m without it.
 
         Returns
         -------
         GustSweep
-            ``dataset`` over (time, response, length); ``worst(response)`` located between the points.
+            ``dataset`` over (time, response, length); ``worst(response)`` located between the points. In both planes
+            every gust blows in the direction that is worst for the response.
 
         Raises
         ------
-        GustError, TimeRangeError, UnknownNameError, NoVehicleError, DataError, IntegrationError
+        GustError, TimeRangeError, UnknownNameError, ParameterValueError, NoVehicleError, DataError, IntegrationError
         """
-        return gust_sweep(self, gust or OneMinusCosine(), times, responses, lengths)
+        return gust_sweep(self, OneMinusCosine() if gust is None else gust, times, responses, lengths)
 
     def fly(
         self,

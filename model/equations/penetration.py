@@ -14,7 +14,8 @@ sum_j c_j delta_j = 0, turns the vehicle, bends it and loads it:
 
     q A sum_j m_j delta_j,    q A sum_j D_ij delta_j,    q A sum_j (A_j - S_2 / I_ZZ m_j) delta_j
 
-(m_j, D_ij, A_j the integrals over zone j of c'_N x, c'_N Y_i and c'_N (x - s) forward of s).
+(m_j, D_ij, A_j the integrals of c'_N x, c'_N Y_i and c'_N (x - s) forward of s, times what zone j's wind is in the
+parabola between zones that the strips meet).
 """
 
 from __future__ import annotations

@@ -54,7 +54,7 @@ from .columns import (
     normal_force_columns,
 )
 from .coverage import check_intensity, check_joint_correlation, check_schedule, check_winds, loaded_flight
-from .loads import AXIAL_FORCE, lateral_loads, load_name
+from .loads import AXIAL_FORCE, LateralLoad, lateral_loads, load_name
 from .mean_wind import through_mean_wind, with_biased_programme
 from .names import name_faults
 from .noise_loads import check_noises, form_is_open, form_of_tables, needed_columns, needed_for
@@ -269,6 +269,7 @@ def _own_angles(reader: _Reader, entry: TableEntry) -> dict[str, Table]:
     return found
 
 
+SHORTEST_WAVE = 1.0  # m, of turbulence
 EVERYTHING = frozenset((*SECTIONS, *PlaneTablesEntry.model_fields))
 
 
@@ -670,9 +671,14 @@ def _read_strips(reader: _Reader, file: VehicleFile) -> Strips | None:
                 stacklevel=3,
             )
         return None
-    if file.planes == BOTH:
-        why = 'are of one plane so far; leave the key out, or fly planes = "yaw" or "pitch"'
-        raise DataError(why, file=reader.toml, column="options.gust_zones")
+    for name in plane_names(file) if file.planes == BOTH else ():
+        own = plane_entry(file, name)
+        if own.tables.aerodynamics is not None or own.bending is not None:
+            why = (
+                f"take one normal force for both planes, but [{name}] has its own aerodynamics or bending; "
+                'set options.gust_zones = 1, or fly planes = "yaw" or "pitch"'
+            )
+            raise DataError(why, file=reader.toml, column="options.gust_zones")
     if entry is None:
         why = "is missing, but options.gust_zones needs it; 'ascentwind build-vehicle' makes it"
         raise DataError(why, file=reader.toml, column="tables.normal_force_along_vehicle")
@@ -692,13 +698,24 @@ def _make_zones(reader: _Reader, file: VehicleFile, strips: Strips) -> Zones:
     weight = np.where(time >= low, values["dynamic_pressure"], 0.0)
     zones = make_zones(strips, zone_count(file), weight, places, file_inside(reader.folder, entry.file))
     found = [*zones.tables(), *zones.rate_tables(values["relative_velocity"])]
-    for load in lateral_loads(file):
-        assert load.station.forward_of_gimbal_m is not None  # its error was raised
-        found += zones.load_tables(load.output, load.station.forward_of_gimbal_m, load.is_shear)
+    for scope, loads in _loads_by_scope(file).items():
+        for load in loads:
+            assert load.station.forward_of_gimbal_m is not None  # its error was raised
+            tables_of_load = zones.load_tables(load.output, load.station.forward_of_gimbal_m, load.is_shear)
+            found += [replace(table, name=f"{scope}{table.name}") for table in tables_of_load]
     rise = tables["altitude"].polynomial.derivative()(time) / values["relative_velocity"]
     found.append(strips.table(AHEAD, "m", (zones.position[0] - values["center_of_gravity"]) * np.minimum(rise, 1.0)))
     tables |= {table.name: table for table in found}
     return zones
+
+
+def _loads_by_scope(file: VehicleFile) -> dict[str, Sequence[LateralLoad]]:
+    """Return the loads across a vehicle, and of both planes those that one has for itself under its name."""
+    found: dict[str, Sequence[LateralLoad]] = {"": lateral_loads(file)}
+    for name in plane_names(file) if file.planes == BOTH else ():
+        if plane_entry(file, name).loads is not None:
+            found[f"{name}."] = lateral_loads(plane_file(file, name))
+    return found
 
 
 def _load_turbulence(
@@ -722,13 +739,17 @@ def _load_turbulence(
         intensity = Table(INTENSITY, "m/s", altitude, sigma, entry.intensity.interpolation)
     high_pass, length = None if entry.high_pass_m == "none" else entry.high_pass_m, entry.length_m
     low, high = (float(x) for x in wind.means[0].argument[[0, -1]])
-    if high_pass is not None and high_pass > high - low:
-        raise DataError(
-            f"is {high_pass:g} m, more than the {high - low:g} m that the wind's statistics cover: no wave of theirs "
-            "is longer; give about twice the distance of their levels",
-            file=reader.toml,
-            column="wind.turbulence.high_pass_m",
-        )
+    for key, metres, advice in (
+        ("high_pass_m", high_pass, "no wave of theirs is longer; give about twice the distance of their levels"),
+        ("length_m", length, "longer waves are wind, not turbulence; give some hundred metres"),
+    ):
+        why = None
+        if metres is not None and metres > high - low:
+            why = f"is {metres:g} m, more than the {high - low:g} m that the wind's statistics cover: {advice}"
+        elif metres is not None and metres < SHORTEST_WAVE:
+            why = f"is {metres:g} m, and waves shorter than {SHORTEST_WAVE:g} m move no vehicle; give metres"
+        if why is not None:
+            raise DataError(why, file=reader.toml, column=f"wind.turbulence.{key}")
     try:
         return Turbulence(entry.form, intensity, length, high_pass, entry.correlation)
     except DataError as error:

@@ -1,16 +1,15 @@
 """Zones along a vehicle that enter a gust one after the other, nose first, and what each makes of its own wind.
 
-A table holds the normal force by strips: integrals of c'_N times 1, x and Y_i over each. Strips in a row make a zone.
-They are cut so that the strips lie as close about their zones as can be, each by its share of the normal force and of
-the bending moments: what a zone lumps meets the wind at other times than the zone. It stands where the size of its
-normal force has its centre.
+A table holds the normal force by strips: integrals of c'_N times 1, x and Y_i over each. Zones stand at some of them;
+every strip meets the wind that the parabola through its three nearest zones gives it, so that forces, moments and
+bending alike are right to the second order of the delays. They stand where straight lines between them would miss the
+least, each strip by its share of the normal force and of the bending moments.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -34,8 +33,7 @@ def zone_count(file: VehicleFile) -> int:
     """Return the number of gust zones: as chosen, else five where turbulence is on and the strips are known."""
     if file.options.gust_zones is not None:
         return file.options.gust_zones
-    one_plane = file.planes != "both"  # in both planes the whole vehicle feels one wind in each
-    return DEFAULT if is_turbulent(file) and one_plane and file.tables.normal_force_along_vehicle else 1
+    return DEFAULT if is_turbulent(file) and file.tables.normal_force_along_vehicle else 1
 
 
 def is_turbulent(file: VehicleFile) -> bool:
@@ -102,13 +100,13 @@ class Strips:
 
 @dataclass(frozen=True, eq=False)
 class Zones:
-    """Strips in zones, the foremost first.
+    """Zones, the foremost first, and how the strips meet their winds.
 
     Attributes
     ----------
     strips : Strips
     member : (n, k) array
-        One where a strip belongs to a zone, zero elsewhere.
+        Share of a zone's wind in that of a strip; they sum to one.
     position : (n,) array
         m forward of the gimbal plane, falling.
     """
@@ -175,12 +173,13 @@ class Zones:
 
 
 def make_zones(strips: Strips, count: int, weight: Array, stations: Sequence[float], file: Path) -> Zones:
-    """Return the zones that spread the least: each strip counts by its share of the normal force and of the moments.
+    """Return the zones whose winds tell the most: each strip counts by its share of normal force and of moments.
 
     Parameters
     ----------
     strips : Strips
     count : int
+        Two or more.
     weight : (t,) array
         By which times count: the dynamic pressure, Pa.
     stations : sequence of float
@@ -193,47 +192,54 @@ def make_zones(strips: Strips, count: int, weight: Array, stations: Sequence[flo
     DataError
         More zones than strips that carry a force.
     """
-    size = weight @ np.abs(strips.slope)
-    if count > np.count_nonzero(size):
+    size, place = weight @ np.abs(strips.slope), strips.forward_of_gimbal
+    carrying = size > 0
+    if count > np.count_nonzero(carrying):
         raise DataError(
-            f"has {np.count_nonzero(size)} strips with a normal force, fewer than options.gust_zones = {count}; take "
-            "fewer zones or build finer strips",
+            f"has {np.count_nonzero(carrying)} strips with a normal force, fewer than options.gust_zones = {count}; "
+            "take fewer zones or build finer strips",
             file=file,
         )
-    shares = [size / size.sum()]
-    for station in stations:
-        arm = np.maximum(strips.forward_of_gimbal - station, 0.0)
-        moment = size * arm
-        if moment.any():
-            shares.append(moment / moment.sum())
-    of_moments = [np.mean(shares[1:], axis=0)] if shares[1:] else []
-    edges = _cuts(np.mean([shares[0], *of_moments], axis=0), strips.forward_of_gimbal, count)
-    member = np.zeros((count, size.size))
-    position = np.zeros(count)
-    for j, (low, high) in enumerate(pairwise(edges)):
-        zone = count - 1 - j
-        member[zone, low:high] = 1.0
-        position[zone] = size[low:high] @ strips.forward_of_gimbal[low:high] / size[low:high].sum()
-    return Zones(strips, member, position)
+    moments = [size * np.maximum(place - station, 0.0) for station in stations]
+    of_moments = [moment / moment.sum() for moment in moments if moment.any()]
+    shares = [size / size.sum(), *([np.mean(of_moments, axis=0)] if of_moments else [])]
+    found = _places(np.mean(shares, axis=0)[carrying], place[carrying], count)
+    return Zones(strips, _between(place, found)[::-1], found[::-1])
 
 
-def _cuts(weight: Array, place: Array, count: int) -> list[int]:
-    """Return where to cut strips in a row so that their weighted squared distances from their zone's centre are least.
+def _places(weight: Array, place: Array, count: int) -> Array:
+    """Return places, increasing, among given ones, between which straight lines miss a parabola the least.
 
-    By dynamic programming: with one strip more the best cut is that of the best one before.
+    By weighted squares, the outer lines drawn on to the ends; by dynamic programming: with one place more the best is
+    that of the best one before.
     """
-    n = weight.size
-    sums = [np.concatenate([[0.0], np.cumsum(weight * place**power)]) for power in (0, 1, 2)]
-    best, cut = np.full((count + 1, n + 1), np.inf), np.zeros((count + 1, n + 1), dtype=int)
-    best[0, 0] = 0.0
-    for parts in range(1, count + 1):
-        for end in range(parts, n + 1):
-            mass, first, second = (total[end] - total[:end] for total in sums)
-            scatter = second - np.divide(first**2, mass, out=np.zeros(end), where=mass > 0)
-            cost = best[parts - 1, :end] + np.where(mass > 0, np.maximum(scatter, 0.0), np.inf)
-            cut[parts, end] = int(np.argmin(cost))
-            best[parts, end] = cost[cut[parts, end]]
-    edges = [n]
-    for parts in range(count, 0, -1):
-        edges.append(int(cut[parts, edges[-1]]))
-    return edges[::-1]
+    n, scaled = place.size, (place - place[0]) / (place[-1] - place[0])
+
+    def missed(a: int, b: int, low: int, high: int) -> float:
+        part = scaled[low:high]
+        return float(weight[low:high] @ (((part - scaled[a]) * (part - scaled[b])) ** 2))
+
+    best, before = np.zeros(n), []
+    for k in range(1, count):
+        low, high = (0 if k == 1 else None), (n if k == count - 1 else None)
+        cost = np.full((n, n), np.inf)
+        for b in range(k, n):
+            for a in range(k - 1, b):
+                cost[b, a] = best[a] + missed(a, b, a if low is None else low, b if high is None else high)
+        before.append(cost.argmin(axis=1))
+        best = cost.min(axis=1)
+    found = [int(np.argmin(best))]
+    for step in before[::-1]:
+        found.append(int(step[found[-1]]))
+    return place[found[::-1]]
+
+
+def _between(place: Array, zones: Array) -> Array:
+    """Return the weights of zones (n,), increasing, in the parabola through the nearest three, (n, k)."""
+    near, found = min(3, zones.size), np.zeros((zones.size, place.size))
+    for k, x in enumerate(place):
+        first = min(range(zones.size - near + 1), key=lambda i: float(np.abs(zones[i : i + near] - x).sum()))
+        chosen = range(first, first + near)
+        for j in chosen:
+            found[j, k] = np.prod([(x - zones[i]) / (zones[j] - zones[i]) for i in chosen if i != j])
+    return found

@@ -30,6 +30,7 @@ from ...model.vehicle.planes import one_wind
 from ...model.vehicle.reader import load_vehicle
 from ...model.vehicle.shipped import find_vehicle
 from ...model.vehicle.vehicle import Vehicle
+from ...model.wind.record import COMPONENTS
 from ...model.wind.statistics import WindModel
 from ..present.notebook import html_page
 from ..solvers.mean_response import Respond, mean_response
@@ -253,6 +254,26 @@ class Case:
         if self.vehicle is not None:
             one_wind(self.vehicle, what)
         raise UnknownNameError("input", WIND, names)
+
+    def wind_inputs(self, what: str) -> list[int]:
+        """Return which of the known inputs are winds: the one that a vehicle meets, or both components of it.
+
+        Parameters
+        ----------
+        what : str
+            The question, which begins the sentence of the error.
+
+        Returns
+        -------
+        list of int
+
+        Raises
+        ------
+        UnknownNameError
+            The system has no such inputs.
+        """
+        names, components = self.system.input_names, [f"{WIND}_{component}" for component in COMPONENTS]
+        return [names.index(c) for c in components] if set(components) <= set(names) else [self.wind_input(what)]
 
     @property
     def start_altitude(self) -> float:

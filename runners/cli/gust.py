@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     from ..gusts.search import GustSweep
 
+LATERAL = ("bending_moment", "shear_force")  # loads across the vehicle, which have resultants
 SHAPES = ("one-minus-cosine", "quasi-square")
 
 
@@ -75,14 +76,16 @@ def gust(
         for name in (n for n in sweeps[0].responses if any(sweep.worst(n).value for sweep in sweeps)):
             over_time = [sweep.over_time(name) for sweep in sweeps]
             job.written += write_figure(gust_figure(sweeps, over_time, name, known.title), job.folder, f"gust_{name}")
-        for load in (name for name in known_loads(known) if name in sweeps[0].responses):
-            worst = [sweep.worst(load) for sweep in sweeps]
+        both = sweeps[0].from_any_direction
+        along = {f"resultant_{load}": load for load in LATERAL} if both else {load: load for load in known_loads(known)}
+        for name, load in ((name, load) for name, load in along.items() if name in sweeps[0].responses):
+            worst = [sweep.worst(name) for sweep in sweeps]
             if not any(each.value for each in worst):
                 continue
-            along = [gust_along_vehicle(sweep, w, load) for sweep, w in zip(sweeps, worst, strict=True)]
-            heading = f"{known.title}\n{words(load).capitalize()} along the vehicle in gusts of {amplitude:g} m/s"
+            found = [gust_along_vehicle(sweep, w, load) for sweep, w in zip(sweeps, worst, strict=True)]
+            heading = f"{known.title}\n{words(name).capitalize()} along the vehicle in gusts of {amplitude:g} m/s"
             job.written += write_figure(
-                along_vehicle_figure(along, worst, heading), job.folder, f"along_vehicle_{load}"
+                along_vehicle_figure(found, worst, heading), job.folder, f"along_vehicle_{name}"
             )
     print_gusts(sweeps, sheets)
     job.end()
@@ -90,22 +93,26 @@ def gust(
 
 def print_gusts(sweeps: list[GustSweep], sheets: list[xr.Dataset]) -> None:
     """Print the worst gusts, and the sheet of combined loads."""
+    import numpy as np
+
     from ..present.style import display, words
 
     amplitude = sweeps[0].gust.amplitude
     table = Table("response", "shape", title=f"Worst gusts of {amplitude:g} m/s, the gust alone")
-    for column in ("size", "at", "length", "from"):
+    both = sweeps[0].from_any_direction
+    for column in ("size", "at", "length", "from", *(["towards"] if both else [])):
         table.add_column(column, justify="right", no_wrap=True)
     for name in sweeps[0].responses:
         for sweep in sweeps:
             w = sweep.worst(name)
             if not w.value:
-                table.add_row(words(name), words(w.gust.name), "not reached", "", "", "")
+                table.add_row(words(name), words(w.gust.name), "not reached", *[""] * (len(table.columns) - 3))
                 continue
             factor, unit = display(w.unit, w.value)
             table.add_row(
                 words(name), words(w.gust.name), f"{factor * w.value:.4g} {unit}", f"{w.time:.2f} s",
                 f"{w.gust.length:.0f} m", f"{w.start_altitude:.0f} m",
+                *([] if w.direction is None else [f"{np.degrees(w.direction) % 360:.0f}°"]),
             )  # fmt: skip
     print_table(table, console)
     columns = ("mean", "random_wind", "gust", "vehicle", "root_sum_square", "joint_inside", "joint_worst")
@@ -115,12 +122,14 @@ def print_gusts(sweeps: list[GustSweep], sheets: list[xr.Dataset]) -> None:
             table.add_column(words(column).replace("root sum square", "|mean| + rss"), justify="right")
         for k, name in enumerate(sweep.responses):
             values = [float(sheet[column][k]) for column in columns]
-            factor, unit = display(sweep.units[k], values)
-            table.add_row(f"{words(name)}, {unit}", *(f"{factor * value:.4g}" for value in values))
+            factor, unit = display(sweep.units[k], [value for value in values if value == value])
+            cells = ("" if value != value else f"{factor * value:.4g}" for value in values)
+            table.add_row(f"{words(name)}, {unit}", *cells)
         print_table(table, console)
+    sides = "any direction" if both else "either side"
     console.print(
         "Random wind and vehicle: 3 sigma. Joint: passed by 0.00135 of flights that are inside the gust at that time "
-        "from either side, or meet it where it does most harm. The random wind holds scales down to some hundred "
+        f"from {sides}, or meet it where it does most harm. The random wind holds scales down to some hundred "
         "metres already: mean + 3 sigma and the whole gust count those twice.",
         highlight=False, soft_wrap=True,
     )  # fmt: skip

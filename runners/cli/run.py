@@ -208,7 +208,8 @@ def run(
         agree = agree and both_check is not None and both_check.agree
     if both_check is not None:
         job.notes.append(both_check.verdict())
-    delays = _check_delays(study, check) if flown.zones is not None and check is not None else None
+    zoned = flown.zones is not None and both is None  # each of both planes has the delays of one alone
+    delays = _check_delays(study, check) if zoned and check is not None else None
     if delays is not None:
         job.notes.append(delays[0])
         agree = agree and delays[1]

@@ -10,12 +10,14 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
+from scipy.stats import norm
 
 from ...codegen.system.evaluation import MatrixEvaluator
 from ...model.equations.noise import DEVIATION
 from ...model.errors import DataError, ParameterValueError, TimeRangeError
-from ...model.system.names import TURBULENCE, WIND
-from ...model.vehicle.planes import one_wind
+from ...model.system.names import COMBINED, TURBULENCE, WIND
+from ...model.vehicle.planes import flown_planes
+from ...model.wind.record import COMPONENTS
 from ...model.wind.turbulence import INTENSITY
 from ..case.case import Case
 from ..case.chain import chain_at
@@ -28,6 +30,8 @@ from ..gusts.weights import WindWeights, weights_of_rows
 from ..present.notebook import html_of
 from ..solvers.time_nodes import interval_before, time_nodes
 from ..statistics.engines import response_statistics
+from ..statistics.norm import NormOfNormal
+from ..statistics.resultants import outputs_of, response_or_resultant
 from .files import write_wind
 from .profile import WindAtPoints, chosen_levels, wind_at_points
 
@@ -45,10 +49,11 @@ class DesignWind:
     ----------
     case : Case
     response, unit : str
+        In both planes a resultant too, of which :attr:`row` is taken.
     time : float
         t2, s.
     sigmas : float
-        k; negative for a load on the other side of the mean.
+        k; negative for a load on the other side of the mean. Of a resultant those of its part in ``direction``.
     combined : bool
         Whether the load is mean + k sigma of all sources, of which the wind makes its part, or of the wind alone.
     mean_response : float
@@ -57,6 +62,11 @@ class DesignWind:
         Of the response, by all sources but the wind's filter.
     points : WindAtPoints
     weights : WindWeights
+    row : tuple of (str, float)
+        Outputs and their factors, whose sum is the response.
+    direction : float or None
+        Of a resultant at its level, where it most likely points, rad from pitch towards yaw: the response is its part
+        there, and all of it in this wind.
     """
 
     case: Case
@@ -69,6 +79,8 @@ class DesignWind:
     other_variance: float
     points: WindAtPoints
     weights: WindWeights
+    row: tuple[tuple[str, float], ...]
+    direction: float | None = None
 
     @property
     def std(self) -> float:
@@ -97,8 +109,13 @@ class DesignWind:
 
     @cached_property
     def mean_wind(self) -> NDArray[np.float64]:
-        """Mean wind at all points, m/s."""
-        return mean_wind(self.case, self.points.altitude)
+        """Mean wind at all points, or both its components, (m, winds), m/s."""
+        return mean_winds(self.case, self.points.altitude)
+
+    def _lines(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return straight lines between the levels' values (levels, winds), at all points."""
+        h = self.points.altitude
+        return np.stack([np.interp(h, h[self._levels], column) for column in values.T], axis=1)
 
     @cached_property
     def _deviation(self) -> NDArray[np.float64]:
@@ -112,53 +129,63 @@ class DesignWind:
     @cached_property
     def added_sigmas(self) -> float:
         """What the deviation at the levels has more, in sigmas, so that straight lines between them make the load."""
-        h, at = self.points.altitude, self._levels
-        unit = self.points.wind_covariance / self.std
-        of_lines = self.points.weight @ np.interp(h, h[at], unit[at])
-        exact = self.points.weight @ (self.mean_wind + self._deviation)
-        mean = self.points.weight @ np.interp(h, h[at], self.mean_wind[at])
-        return float((exact - mean) / of_lines - self.sigmas)
+        at, points = self._levels, self.points
+        of_lines = points.response_to(self._lines(points.wind_covariance[at] / self.std))
+        exact = points.response_to(self.mean_wind + self._deviation)
+        mean = points.response_to(self._lines(self.mean_wind[at]))
+        return (exact - mean) / of_lines - self.sigmas
 
     @cached_property
     def profile(self) -> xr.Dataset:
         """The wind over (altitude): linear between levels it makes the load, and there is a level at h(t2).
 
         ``wind``, ``mean``, ``deviation`` and its size in ``local_sigmas`` of the wind there; ``conditional_std`` of
-        the winds that make this load, ``band`` (altitude, bound) that holds 95 % of them.
+        the winds that make this load, ``band`` (altitude, bound) that holds 95 % of them. In both planes each is over
+        (altitude, component), towards the east and towards the north.
         """
         at = self._levels
         deviation = self.points.wind_covariance[at] * ((self.sigmas + self.added_sigmas) / self.std)
         wind, std = self.mean_wind[at] + deviation, self.points.std[at]
-        share = np.divide(self.points.wind_covariance[at], std * self.std, out=np.zeros(at.size), where=std > 0)
+        share = np.divide(self.points.wind_covariance[at], std * self.std, out=np.zeros_like(std), where=std > 0)
         conditional = std * np.sqrt(np.maximum(1 - share**2, 0.0))
-        local = np.divide(deviation, std, out=np.zeros(at.size), where=std > 0)
+        local = np.divide(deviation, std, out=np.zeros_like(std), where=std > 0)
         speed = {"units": "m/s"}
+        components = COMPONENTS if std.shape[1] > 1 else None
+        over = "altitude" if components is None else ("altitude", "component")
+        band = wind[..., None] + BAND * conditional[..., None] * np.array([-1.0, 1.0])
+        if components is None:
+            wind, std, conditional, local, deviation, band = (
+                x[:, 0] for x in (wind, std, conditional, local, deviation, band)
+            )
+        mean = self.mean_wind[at] if components else self.mean_wind[at, 0]
         return xr.Dataset(
             {
-                "wind": ("altitude", wind, speed | {"long_name": "most likely wind behind the load"}),
-                "mean": ("altitude", self.mean_wind[at], speed | {"long_name": "mean wind"}),
-                "deviation": ("altitude", deviation, speed | {"long_name": "wind less its mean"}),
+                "wind": (over, wind, speed | {"long_name": "most likely wind behind the load"}),
+                "mean": (over, mean, speed | {"long_name": "mean wind"}),
+                "deviation": (over, deviation, speed | {"long_name": "wind less its mean"}),
                 "local_sigmas": (
-                    "altitude",
+                    over,
                     local,
                     {"units": "1", "long_name": "deviation in sigmas of the wind there"},
                 ),
-                "conditional_std": ("altitude", conditional, speed | {"long_name": "std of winds that make the load"}),
+                "conditional_std": (over, conditional, speed | {"long_name": "std of winds that make the load"}),
                 "band": (
-                    ("altitude", "bound"),
-                    wind[:, None] + BAND * np.outer(conditional, [-1.0, 1.0]),
+                    (*(("altitude",) if components is None else over), "bound"),
+                    band,
                     speed | {"long_name": "holds 95 % of the winds that make the load"},
                 ),
             },
             {
                 "altitude": ("altitude", self.points.altitude[at], {"units": "m", "long_name": "altitude"}),
                 "bound": ["lower", "upper"],
+                **({} if components is None else {"component": list(components)}),
             },
             provenance(self.case)
             | {"response": self.response, "unit": self.unit, "t2_s": self.time, "sigmas": self.sigmas}
             | {"combined": str(self.combined).lower(), "load": self.load, "load_by_wind": self.load_by_wind}
             | {"altitude_at_t2_m": self.altitude_at_time, "side": self.side}
-            | {"added_sigmas": self.added_sigmas},
+            | {"added_sigmas": self.added_sigmas}
+            | ({} if self.direction is None else {"direction_rad": self.direction}),
         )
 
     @property
@@ -180,7 +207,7 @@ class DesignWind:
         Returns
         -------
         xarray.DataArray
-            Over (draw, altitude), m/s, at the levels of the profile.
+            Over (draw, altitude), in both planes (draw, altitude, component), m/s, at the levels of the profile.
 
         Raises
         ------
@@ -193,14 +220,17 @@ class DesignWind:
         gain, load = self.points.wind_covariance[at] / self.std**2, self.sigmas * self.std
         for first in range(0, count, TOGETHER):
             wind = self.points.drawn(random, min(TOGETHER, count - first))
-            made = self.points.weight @ wind
+            made = np.einsum("kc,kcd->d", self.points.weight, wind)
             if self.combined:
                 made += math.sqrt(self.other_variance) * random.standard_normal(made.size)
-            parts.append(self.mean_wind[at, None] + wind[at] + np.outer(gain, load - made))
-        found = np.concatenate(parts, axis=1)
+            parts.append(self.mean_wind[at, :, None] + wind[at] + gain[..., None] * (load - made))
+        found = np.moveaxis(np.concatenate(parts, axis=2), 2, 0)
         profile = self.profile
         what = {"units": "m/s", "long_name": "wind given the load"}
-        return xr.DataArray(found.T, {"altitude": profile["altitude"]}, ("draw", "altitude"), attrs=what)
+        if "component" not in profile.dims:
+            return xr.DataArray(found[..., 0], {"altitude": profile["altitude"]}, ("draw", "altitude"), attrs=what)
+        over = {name: profile[name] for name in ("altitude", "component")}
+        return xr.DataArray(found, over, ("draw", "altitude", "component"), attrs=what)
 
     def write(self, path: str | Path) -> Path:
         """Write the profile as CSV: altitude [m], u [m/s] towards the east, v [m/s] towards the north.
@@ -227,7 +257,8 @@ class DesignWind:
         """E[deviation | load] of the vehicle's sources over (source, t), to t2; None for the load of the wind alone.
 
         In the unit of each source's standard deviation; a white source has that of white noise. That of a wind bias is
-        a factor on the mean wind, which the profile leaves out; turbulence is a wind in m/s.
+        a factor on the mean wind, which the profile leaves out; turbulence is a wind in m/s. What each of both planes
+        has for itself stands under the source's name and the plane's.
         """
         if not self.combined:
             return None
@@ -236,27 +267,38 @@ class DesignWind:
         times = np.linspace(system.start, node, max(2, int(np.ceil((node - system.start) / STEP)) + 1))
         grid = np.unique(time_nodes(case.with_means, times))
         chain = chain_at(case, grid)
-        adjoint = [chain.output[-1][system.output_index(self.response)]]
+        adjoint = [sum(x * chain.output[-1][system.output_index(name)] for name, x in self.row)]
         for Phi in chain.transition[::-1]:
             adjoint.append(adjoint[-1] @ Phi)
         back = np.array(adjoint[::-1])
-        names, values = [s for s in system.sources if s != WIND], []
-        for name in names:
-            states = [k for k, s in enumerate(system.states) if s.name == f"{DEVIATION}_{name}"]
+        flown = [plane.name for plane in flown_planes(case.vehicle_for("deviations"))]
+        found: dict[str, NDArray[np.float64]] = {}
+        for name in (s for s in system.sources if s != WIND):
+            each = {"": name} if len(flown) == 1 else {"": name} | {f"_{plane}": name for plane in flown}
+            states = [
+                (f"{name}{end}", k)
+                for end in each
+                for k, s in enumerate(system.states)
+                if s.name == f"{DEVIATION}_{name}{end}"
+            ]
             if name == TURBULENCE:
-                P = chain.covariance([system.sources.index(name)])
-                values.append(np.einsum("ki,kin,kn->k", self._turbulence(grid), P[:, system.block(name)], back))
+                P = chain.covariance([system.sources.index(name)])[:, system.block(name)]
+                parts = np.array_split(P, len(flown), axis=1)  # each plane has its own
+                for plane, part in zip(flown, parts, strict=True):
+                    under = name if len(flown) == 1 else f"{name}_{plane}"
+                    found[under] = np.einsum("ki,kin,kn->k", self._turbulence(grid), part, back)
             elif states:
                 (sigma,) = (p.value for n, p in case.parameters.items() if n in _sigmas(name))
                 P = chain.covariance([system.sources.index(name)])
-                values.append(sigma * np.einsum("kn,kn->k", P[:, states[0]], back))
+                found |= {under: sigma * np.einsum("kn,kn->k", P[:, state], back) for under, state in states}
             else:
-                (column,) = system.noise_columns(name)
-                values.append(np.einsum("kn,kn->k", chain.noise_matrix[:, :, column], back))
-        found = np.array(values).reshape(len(names), grid.size) * (self.sigmas / self.std)
+                for column in system.noise_columns(name):
+                    under = system.noise_names[column]
+                    found[under] = np.einsum("kn,kn->k", chain.noise_matrix[:, :, column], back)
+        values = np.array(list(found.values())).reshape(len(found), grid.size) * (self.sigmas / self.std)
         return xr.Dataset(
-            {"deviation": (("source", "t"), found, {"long_name": "most likely deviation behind the load"})},
-            {"source": names, "t": ("t", grid, {"units": "s", "long_name": "flight time"})},
+            {"deviation": (("source", "t"), values, {"long_name": "most likely deviation behind the load"})},
+            {"source": list(found), "t": ("t", grid, {"units": "s", "long_name": "flight time"})},
             provenance(case),
         )
 
@@ -270,6 +312,8 @@ class DesignWind:
 
     def __repr__(self) -> str:
         kind = "of all sources" if self.combined else "of the wind alone"
+        if self.direction is not None:
+            kind += f", towards {np.degrees(self.direction):.0f} degrees from pitch towards yaw"
         return (
             f"DesignWind behind {self.response} = {self.load:.6g} {self.unit} at {self.time:g} s: mean + "
             f"{self.sigmas:g} sigma {kind} ({self.side})\n  {self.profile.sizes['altitude']} levels, a corner at "
@@ -284,11 +328,10 @@ def _sigmas(source: str) -> tuple[str, str]:
     return f"{source}.sigma", f"{source}.standard_deviation"
 
 
-def mean_wind(case: Case, altitude: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the mean wind (m/s) that a case's vehicle meets at altitudes (m)."""
-    table = one_wind(case.vehicle_for("a mean wind"), "a mean wind").mean
-    held = np.clip(altitude, table.argument[0], table.argument[-1])
-    return case.parameters["wind.mean_scale"].value * table.polynomial(held)
+def mean_winds(case: Case, altitude: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the mean wind (m/s) that a case's vehicle meets at altitudes (m), or both components, (m, winds)."""
+    scale, means = case.parameters["wind.mean_scale"].value, case.vehicle_for("a mean wind").wind.means
+    return scale * np.stack([m.polynomial(np.clip(altitude, m.argument[0], m.argument[-1])) for m in means], axis=1)
 
 
 def design_wind(
@@ -300,44 +343,84 @@ def design_wind(
     if time is None:
         raise TimeRangeError("a design wind is of one time: give it in seconds, or the load of a flight")
     if isinstance(sigmas, bool) or not isinstance(sigmas, int | float) or not math.isfinite(sigmas):
-        raise ParameterValueError(f"a load of {sigmas!r} sigmas is none; give a number, negative for the other side")
-    one_wind(case.vehicle_for("a design wind"), "a design wind")
-    climb = Climb.of(case)
-    turbulence = case.vehicle_for("a design wind").turbulence
-    if turbulence is not None and turbulence.correlation is not None:
+        raise ParameterValueError(
+            f"a load of {sigmas!r:.60} sigmas is none; give a number, negative for the other side"
+        )
+    if not isinstance(combined, bool):
+        raise ParameterValueError(f"combined = {combined!r:.60} is neither true nor false")
+    return _behind(case, _checked_name(case, response), seconds(time), float(sigmas), combined)
+
+
+def _checked_name(case: Case, response: object) -> str:
+    if not isinstance(response, str):
+        raise ParameterValueError(
+            f"a design wind is of one response by name, or of a flight's load, not {response!r:.60}"
+        )
+    return response_or_resultant(case, response)
+
+
+def _behind(
+    case: Case, name: str, time: float, sigmas: float, combined: bool, level: float | None = None
+) -> DesignWind:
+    """Return the wind behind mean + k sigma, or behind a level where one is given."""
+    vehicle, climb, system = case.vehicle_for("a design wind"), Climb.of(case), case.system
+    if vehicle.turbulence is not None and vehicle.turbulence.correlation is not None:
         raise DataError(
             "turbulence is correlated with the wind, so that one filter does not tell which wind is behind a load; "
             "leave wind.turbulence.correlation out"
         )
-    (name,) = case.checked_responses([response])
-    (end,) = case.checked_times([seconds(time)])
-    executable, system = case.with_means, case.system
-    node = float(time_nodes(executable, [end])[0])
+    (end,) = case.checked_times([time])
+    node = float(time_nodes(case.with_means, [end])[0])
     if not node > system.start:
         raise TimeRangeError(f"at the start at {system.start:g} s nothing has been flown; give a later time")
-    row = system.output_index(name)
-    here = interval_before(executable, node)
-    C, G, inputs = MatrixEvaluator(executable, ("C", "G", "inputs"))(node, here.low, here.high)
-    wind = case.wind_input("a design wind")
-    mean = float(C[row] @ case.mean_states(np.array([node]))[0] + G[row] @ inputs[:, 0])
-    (weights,) = weights_of_rows(case, [end], [(C[[row]], G[[row], wind])], node - system.start)
-    variance = response_statistics(case, [end], responses=[name]).variance
-    other = sum(float(variance.sel(source=s).squeeze()) for s in system.sources if s != WIND)
-    vehicle = case.vehicle_for("a design wind")
-    top = float(one_wind(vehicle, "a design wind").mean.argument[-1])
+    outputs = outputs_of(case, name)
+    rows = [system.output_index(output) for output in outputs]
+    here = interval_before(case.with_means, node)
+    C, G, inputs = MatrixEvaluator(case.with_means, ("C", "G", "inputs"))(node, here.low, here.high)
+    means = C[rows] @ case.mean_states(np.array([node]))[0] + G[rows] @ inputs[:, 0]
+    engine = "covariance" if len(rows) > 1 and case.executable.shared_library is None else None
+    found = response_statistics(case, [end], responses=outputs, engine=engine)
+    by_source = _covariances(found.dataset, outputs)
+    factors, direction = np.ones(1), None
+    if len(rows) > 1:
+        law = NormOfNormal(means, sum(by_source.values()) if combined else by_source[WIND])
+        level = float(law.percentile(float(norm.sf(sigmas)))) if level is None else level
+        direction = float(law.direction(level).most_likely)
+        factors = np.array([math.cos(direction), math.sin(direction)])
+    mean = float(factors @ means)
+    winds = case.wind_inputs("a design wind")
+    ends = [((factors @ C[rows])[None], (factors @ G[np.ix_(rows, winds)])[None])]
+    (weights,) = weights_of_rows(case, [end], ends, node - system.start)
+    other = sum(float(factors @ P @ factors) for source, P in by_source.items() if source != WIND)
+    top = max(float(m.argument[-1]) for m in vehicle.wind.means)
     points = wind_at_points(case, climb, weights, top)
     if not points.variance > 0:
         raise NoVarianceError(f"the wind does not reach '{name}' at {end:g} s: no wind makes that load")
-    return DesignWind(case, name, system.outputs[row].unit, end, float(sigmas), combined, mean, other, points, weights)
+    if level is not None:
+        sigmas = (level - mean) / math.sqrt(points.variance + (other if combined else 0.0))
+    row = tuple(zip(outputs, factors.tolist(), strict=True))
+    unit = system.outputs[rows[0]].unit
+    return DesignWind(case, name, unit, end, sigmas, combined, mean, other, points, weights, row, direction)
+
+
+def _covariances(found: xr.Dataset, outputs: tuple[str, ...]) -> dict[str, NDArray[np.float64]]:
+    """Return the covariance (outputs, outputs) of responses at one time by each source."""
+    sources = [str(source) for source in found["source"].values if source != COMBINED]
+    at = found.isel(time=0)
+    if len(outputs) == 1:
+        return {s: at["variance"].sel(source=s, response=list(outputs)).values.reshape(1, 1) for s in sources}
+    whole = at["covariance"].sel(response=list(outputs), other_response=list(outputs))
+    return {s: whole.sel(source=s).transpose("response", "other_response").values for s in sources}
 
 
 def _of_flight_load(load: FlightLoad, time: float | None) -> DesignWind:
     """Return the combined design wind behind a flight's level, at the time at which flights most likely pass it."""
     if time is not None:
         raise TimeRangeError("the time follows from the load of the flight; leave it out")
-    density, level = load.time_of_maximum[1], float(load.level[0])
+    density, level, case = load.time_of_maximum[1], float(load.level[0]), load.of.case
     at = round(float(density["time"][int(np.argmax(density.values))]), 3)
-    unit = design_wind(load.of.case, load.response, at, 1.0, True)
-    upper = load.sides == "upper" or (load.sides == "both" and unit.mean_response >= 0)
-    sigmas = ((level if upper else -level) - unit.mean_response) / unit.std
-    return design_wind(load.of.case, load.response, at, sigmas, True)
+    if len(outputs_of(case, load.response)) > 1:
+        return _behind(case, load.response, at, 0.0, True, level)
+    mean = _behind(case, load.response, at, 1.0, True).mean_response
+    upper = load.sides == "upper" or (load.sides == "both" and mean >= 0)
+    return _behind(case, load.response, at, 0.0, True, level if upper else -level)

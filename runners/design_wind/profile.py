@@ -8,7 +8,7 @@ below up to it,
     a(h) = integral over s < h of Phi(h, s) P(s) H(s)' g(s) ds,
 
 by Gauss-Legendre quadrature in panels, inside which integrals end at the nodes as in Gauss collocation. cov(w, y) has
-a corner at h(t2).
+a corner at h(t2). In both planes w has two components of one filter, H two rows and g two weights.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from ...model.wind.propagation import transitions
 from ...model.wind.shaping_filter import ShapingFilter
+from ...model.wind.two_components import TwoComponentWind
 from ..case.case import Case
 from ..case.climb import Climb
 from ..gusts.weights import WindWeights
@@ -48,9 +49,9 @@ class WindAtPoints:
     ----------
     altitude : (m,) array
         m, increasing; every ``STRIDE``-th point is the edge of a panel.
-    weight : (m,) array
-        Of the wind at each point in the response, quadrature included.
-    output : (m, n) array
+    weight : (m, winds) array
+        Of the wind, or of both its components, at each point in the response, quadrature included.
+    output : (m, winds, n) array
         H, the factor on the wind's standard deviation included.
     transition, added : (m - 1, n, n) arrays
         From each point to the next, and the covariance that noise adds.
@@ -74,7 +75,7 @@ class WindAtPoints:
     @cached_property
     def _in_panels(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return b and cov(z, y) at each point, (m, n); what a panel's own weights do is integrated to each node."""
-        n, panels = self.output.shape[1], (self.altitude.size - 1) // STRIDE
+        n, panels = self.output.shape[2], (self.altitude.size - 1) // STRIDE
         steps = self.transition.reshape(panels, STRIDE, n, n)
         from_edge = [steps[:, 0]]
         for k in range(1, STRIDE):
@@ -83,10 +84,11 @@ class WindAtPoints:
         to_node = np.array(to_nodes).swapaxes(0, 1)  # (panels, nodes, n, n)
         back = np.linalg.inv(to_node)
         inside = np.arange(panels)[:, None] * STRIDE + 1 + np.arange(NODES.size)
-        H, g, P = self.output[inside], self.weight[inside], self.covariance[inside]
-        above = np.einsum("pkji,pkj->pki", to_node, H) * g[..., None]  # weights as they count at the lower edge
-        below = np.einsum("pkij,pkj->pki", back, np.einsum("pkij,pkj->pki", P, H)) * g[..., None]
-        direct = self.output[::STRIDE] * self.weight[::STRIDE, None]
+        rows = np.einsum("kc,kcn->kn", self.weight, self.output)
+        g, P = rows[inside], self.covariance[inside]
+        above = np.einsum("pkji,pkj->pki", to_node, g)  # weights as they count at the lower edge
+        below = np.einsum("pkij,pkj->pki", back, np.einsum("pkij,pkj->pki", P, g))
+        direct = rows[::STRIDE]
         b, a = np.zeros((panels + 1, n)), np.zeros((panels + 1, n))
         b[-1] = direct[-1]
         for k in range(panels - 1, -1, -1):
@@ -94,7 +96,7 @@ class WindAtPoints:
         own = np.einsum("kij,kj->ki", self.covariance[::STRIDE], direct)
         for k in range(panels):
             a[k + 1] = across[k] @ (a[k] + own[k] + below[k].sum(axis=0))
-        adjoint, covariance = np.zeros_like(self.output), np.zeros_like(self.output)
+        adjoint, covariance = np.zeros((self.altitude.size, n)), np.zeros((self.altitude.size, n))
         adjoint[::STRIDE] = b
         covariance[::STRIDE] = a + np.einsum("kij,kj->ki", self.covariance[::STRIDE], b)
         left = (b - direct)[:-1, None] - np.einsum("ij,pjn->pin", UP_TO, above)
@@ -115,13 +117,17 @@ class WindAtPoints:
 
     @cached_property
     def wind_covariance(self) -> NDArray[np.float64]:
-        """cov(w, y) at each point, (m,), m/s times the response's unit."""
-        return np.einsum("ki,ki->k", self.output, self.state_covariance)
+        """cov(w, y) at each point, (m, winds), m/s times the response's unit."""
+        return np.einsum("kci,ki->kc", self.output, self.state_covariance)
 
     @cached_property
     def variance(self) -> float:
         """Of the response, by the random wind alone."""
-        return float(self.weight @ self.wind_covariance)
+        return self.response_to(self.wind_covariance)
+
+    def response_to(self, wind: NDArray[np.float64]) -> float:
+        """Return the response to a wind (m, winds), m/s."""
+        return float((self.weight * wind).sum())
 
     @cached_property
     def variance_in_white_noise(self) -> float:
@@ -132,12 +138,12 @@ class WindAtPoints:
 
     @property
     def std(self) -> NDArray[np.float64]:
-        """Standard deviation of the wind at each point, m/s."""
-        return np.sqrt(np.maximum(np.einsum("ki,kij,kj->k", self.output, self.covariance, self.output), 0.0))
+        """Standard deviation of the wind at each point, (m, winds), m/s."""
+        return np.sqrt(np.maximum(np.einsum("kci,kij,kcj->kc", self.output, self.covariance, self.output), 0.0))
 
     def drawn(self, random: np.random.Generator, count: int) -> NDArray[np.float64]:
-        """Return random winds at all points, (m, count), m/s."""
-        n = self.output.shape[1]
+        """Return random winds at all points, (m, winds, count), m/s."""
+        n = self.output.shape[2]
         roots = symmetric_root(np.concatenate([self.covariance[:1], self.added]))
         z = roots[0] @ random.standard_normal((n, count))
         found = [self.output[0] @ z]
@@ -181,23 +187,35 @@ def _at(
     altitude = np.append(np.concatenate([edges[:-1, None], inside], axis=1).ravel(), edges[-1])
     middle = edges[:-1] + 0.5 * spans
     flown = (middle > start) & (middle < last)
-    quadrature, weight = np.zeros(altitude.size), np.zeros(altitude.size)
+    winds = _components(shaping_filter, case)
+    quadrature, weight = np.zeros(altitude.size), np.zeros((altitude.size, len(winds)))
     part = np.zeros((spans.size, STRIDE))
     part[:, 1:] = 0.5 * spans[:, None] * WEIGHTS
     quadrature[:-1] = part.ravel()
     times = climb.time_at(inside[flown].ravel())
     rate = climb.polynomial(times, 1)
-    part[:, 1:] = 0.0
-    part[flown, 1:] = 0.5 * spans[flown, None] * WEIGHTS * (weights.at(times)[:, 0] / rate).reshape(-1, NODES.size)
-    weight[:-1] = part.ravel()
-    weight[STRIDE * int(np.abs(edges - last).argmin())] += weights.direct[0]
+    of_winds = np.zeros((*part.shape, len(winds)))
+    shares = (weights.at(times) / rate[:, None]).reshape(-1, NODES.size, len(winds))
+    of_winds[flown, 1:] = (0.5 * spans[flown, None] * WEIGHTS)[..., None] * shares
+    weight[:-1] = of_winds.reshape(-1, len(winds))
+    weight[STRIDE * int(np.abs(edges - last).argmin())] += weights.direct
     transition, added = transitions(shaping_filter, altitude)
     P = [shaping_filter.start_covariance]
     for Phi, Q in zip(transition, added, strict=True):
         P.append(Phi @ P[-1] @ Phi.T + Q)
     _, G, H = shaping_filter.at(altitude)
     scale = case.parameters["wind.sigma_scale"].value
-    return WindAtPoints(altitude, weight, scale * H, transition, added, np.array(P), G, quadrature)
+    rows = scale * H[:, None, :] * winds
+    return WindAtPoints(altitude, weight, rows, transition, added, np.array(P), G, quadrature)
+
+
+def _components(shaping_filter: ShapingFilter, case: Case) -> NDArray[np.float64]:
+    """Return by ones which of the filter's states each wind is made of, (winds, n): all of them in one plane."""
+    wind, n = case.vehicle_for("a design wind").wind, shaping_filter.order
+    if not isinstance(wind, TwoComponentWind):
+        return np.ones((1, n))
+    zonal = np.arange(n) < wind.filters.zonal.order
+    return np.array([zonal, ~zonal], float)
 
 
 def chosen_levels(points: WindAtPoints, wind: NDArray[np.float64], last: float, missed: float) -> NDArray[np.intp]:
@@ -206,7 +224,7 @@ def chosen_levels(points: WindAtPoints, wind: NDArray[np.float64], last: float, 
     Parameters
     ----------
     points : WindAtPoints
-    wind : (m,) array
+    wind : (m, winds) array
         The profile at all points, m/s.
     last : float
         h(t2), m.
@@ -222,8 +240,8 @@ def chosen_levels(points: WindAtPoints, wind: NDArray[np.float64], last: float, 
 
     def off(a: int, b: int) -> float:
         i, j = edges[a], edges[b]
-        line = wind[i] + (wind[j] - wind[i]) * (h[i + 1 : j] - h[i]) / (h[j] - h[i])
-        return float(points.weight[i + 1 : j] @ (wind[i + 1 : j] - line))
+        line = wind[i] + np.outer((h[i + 1 : j] - h[i]) / (h[j] - h[i]), wind[j] - wind[i])
+        return float((points.weight[i + 1 : j] * (wind[i + 1 : j] - line)).sum())
 
     at = h[edges]
     kept, spacing = [0], np.where(np.abs(at - last) <= NEAR + SAME, DENSE, FAR)

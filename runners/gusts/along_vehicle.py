@@ -6,12 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from ...model.vehicle.loads import BENDING_MOMENT
+from ...model.vehicle.planes import flown_planes
 from ..case.provenance import provenance
 from ..station_loads.loads_along_vehicle import load_rows
+from .clocking import largest, towards
 from .response import described, gust_products
 from .search import AFTER, GustSweep, WorstGust
+from .shapes import Gust
 from .weights import weights_of_rows
 
 
@@ -26,7 +30,8 @@ def gust_along_vehicle(
     worst : WorstGust
         One of the sweep's.
     load : str
-        Bending moment, shear force, axial force or equivalent axial load.
+        Bending moment, shear force, axial force or equivalent axial load; in both planes the resultant of one of the
+        first two.
     slosh_reaction : bool
         Whether the whole vehicle answers slosh, without which the moment does not vanish at the tail.
 
@@ -34,20 +39,28 @@ def gust_along_vehicle(
     -------
     xarray.Dataset
         ``in_worst_gust`` of that gust, and ``envelope``, the largest size of any gust of the sweep's lengths, with its
-        ``length`` and ``start_altitude``.
+        ``length`` and ``start_altitude``; in both planes of gusts from any direction.
 
     Raises
     ------
     DataError, UnknownNameError, IntegrationError
     """
     case, climb = sweep.case, sweep.climb
-    rows = load_rows(case, [worst.time], load=load, slosh_reaction=slosh_reaction)
-    wind = case.wind_input("a gust")
+    planes = flown_planes(case.vehicle_for("a gust")) if sweep.from_any_direction else (None,)
+    parts = [load_rows(case, [worst.time], load=load, slosh_reaction=slosh_reaction, plane=plane) for plane in planes]
+    rows, winds = parts[0], case.wind_inputs("a gust")
     reach = max(worst.time - worst.time_met, sweep.longest + AFTER)
-    weights = weights_of_rows(case, [worst.time], [(rows.state[0], rows.direct[0, :, wind])], reach)[0]
-    own = gust_products(weights, climb, worst.gust, np.array([worst.start_altitude]))[0]
+    state, direct = (np.concatenate([getattr(part, of)[0] for part in parts]) for of in ("state", "direct"))
+    weights = weights_of_rows(case, [worst.time], [(state, direct[:, winds])], reach)[0]
+
+    def by_station(gust: Gust, starts: NDArray[np.float64]) -> NDArray[np.float64]:
+        products = gust_products(weights, climb, gust, starts).reshape(starts.size, len(parts), -1, len(winds))
+        return products.swapaxes(1, 2)  # (starts, stations, planes, winds)
+
+    in_planes = towards(by_station(worst.gust, np.array([worst.start_altitude]))[0], worst.direction)
+    own = in_planes[:, 0] if len(parts) == 1 else np.linalg.norm(in_planes, axis=1)
     starts = sweep.starts(weights)
-    found = np.array([gust_products(weights, climb, replace(sweep.gust, length=L), starts) for L in sweep.lengths])
+    found = np.array([largest(by_station(replace(sweep.gust, length=L), starts)) for L in sweep.lengths])
     flat = np.abs(found).reshape(-1, found.shape[2])
     best = flat.argmax(axis=0)
     q, p = np.unravel_index(best, found.shape[:2])

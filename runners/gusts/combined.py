@@ -2,7 +2,8 @@
 
 For every response at the time of its worst gust. The joint levels are those that the size of the response passes with
 the chance 0.00135 when mean, gust and normal parts act together, with the gust where it does most harm, or with the
-vehicle anywhere inside it, and from either side.
+vehicle anywhere inside it, and from either side. In both planes gusts blow from any direction, and a resultant has its
+joint levels alone, by the law of a norm, which has no sigma.
 """
 
 from __future__ import annotations
@@ -19,7 +20,9 @@ from ...model.vehicle.biases import WIND_BIAS
 from ..case.provenance import provenance
 from ..present.netcdf import RULE
 from ..statistics.engines import response_statistics
+from ..statistics.norm import NormOfNormal
 from ..statistics.percentiles import instant_level
+from .clocking import Quantities, towards
 from .response import gust_products
 from .search import GustSweep, WorstGust
 from .weights import wind_weights
@@ -29,6 +32,7 @@ DESIGN_WIND = 0.99  # one-sided; the wind that a gust is added to
 REDUCED = 0.85  # on wind and gust where both are added (TM X-64757 as it is remembered, not checked)
 OF_WIND = (WIND, TURBULENCE, WIND_BIAS)
 PHASES = 201  # of the vehicle inside a gust
+DIRECTIONS = 72  # of a gust that blows from any
 MEANINGS = {
     "mean": "mean response in the mean wind",
     "random_wind": "3 sigma of the random wind",
@@ -36,7 +40,7 @@ MEANINGS = {
     "vehicle": "3 sigma of the vehicle's dispersions",
     "root_sum_square": "|mean| + root sum square of wind, gust and vehicle",
     "joint_worst": "passed with 0.00135, the gust where and from where it does most harm",
-    "joint_inside": "passed with 0.00135, the vehicle anywhere inside the gust, which blows from either side",
+    "joint_inside": "passed with 0.00135, the vehicle anywhere inside the gust, from either side or any direction",
     "gust_on_design_wind": "|mean| + root sum square of vehicle and 0.85 (99 % wind + gust)",
     "without_gust": "passed with 0.00135 without a gust",
 }
@@ -60,9 +64,18 @@ def combined_loads(sweep: GustSweep) -> xr.Dataset:
     """
     worst = [sweep.worst(name) for name in sweep.responses]
     times = sorted({each.time for each in worst})
-    found = response_statistics(sweep.case, times, responses=sweep.responses)
+    quantities = Quantities.of(sweep.case, sweep.responses)
+    with_covariance = any(len(members) > 1 for members in quantities.members)
+    interpreted = sweep.case.executable.shared_library is None
+    engine = "covariance" if with_covariance and interpreted else None  # norms need covariances between responses
+    found = response_statistics(sweep.case, times, responses=quantities.outputs, engine=engine)
     sheet: dict[str, list[float]] = {name: [] for name in MEANINGS}
-    for each in worst:
+    for each, members in zip(worst, quantities.members, strict=True):
+        if len(members) > 1:
+            row = _of_resultant(sweep, each, found.dataset, [quantities.outputs[k] for k in members])
+            for name in MEANINGS:
+                sheet[name].append(row.get(name, np.nan))
+            continue
         at = {"time": each.time, "response": each.response}
         mean = float(found.mean.sel(source=COMBINED, **at))
         variance = {str(s): float(found.variance.sel(source=s, **at)) for s in found["source"].values if s != COMBINED}
@@ -75,7 +88,7 @@ def combined_loads(sweep: GustSweep) -> xr.Dataset:
         sheet["vehicle"].append(3 * vehicle)
         sheet["root_sum_square"].append(abs(mean) + float(np.sqrt((3 * whole) ** 2 + size**2)))
         sheet["joint_worst"].append(float(instant_level(abs(mean) + size, whole, CHANCE)))
-        sheet["joint_inside"].append(mixture_level(mean + inside_gust(sweep, each), whole, CHANCE))
+        sheet["joint_inside"].append(mixture_level(mean + inside_gust(sweep, each)[:, 0], whole, CHANCE))
         together = REDUCED * (float(ndtri(DESIGN_WIND)) * wind + size)
         sheet["gust_on_design_wind"].append(abs(mean) + float(np.hypot(together, 3 * vehicle)))
         sheet["without_gust"].append(float(instant_level(mean, whole, CHANCE)))
@@ -96,14 +109,53 @@ def combined_loads(sweep: GustSweep) -> xr.Dataset:
 
 
 def inside_gust(sweep: GustSweep, worst: WorstGust) -> NDArray[np.float64]:
-    """Return the responses at a worst gust's time to that gust at every phase, from one side and from the other."""
+    """Return the responses at a worst gust's time to that gust at every phase, from either side or any direction.
+
+    (gusts, rows): of a resultant both planes' responses.
+    """
     top = float(sweep.climb.altitude(worst.time))
     lowest = max(top - worst.gust.length, float(sweep.climb.altitudes[0]))
     starts = np.linspace(lowest, top, PHASES)
     reach = worst.time - float(sweep.climb.time_at(lowest))
-    weights = wind_weights(sweep.case, [worst.time], [worst.response], reach)[0]
-    found = gust_products(weights, sweep.climb, worst.gust, starts)[:, 0]
-    return np.concatenate([found, -found])
+    quantities = Quantities.of(sweep.case, [worst.response])
+    weights = wind_weights(sweep.case, [worst.time], quantities.outputs, reach)[0]
+    rows = quantities.rows(gust_products(weights, sweep.climb, worst.gust, starts), 0)
+    if worst.direction is None:
+        found = towards(rows, None)
+        return np.concatenate([found, -found])
+    return np.concatenate([towards(rows, chi) for chi in np.linspace(0, 2 * np.pi, DIRECTIONS, endpoint=False)])
+
+
+def _of_resultant(sweep: GustSweep, worst: WorstGust, found: xr.Dataset, outputs: list[str]) -> dict[str, float]:
+    """Return what a norm has of the sheet: its mean's size, the gust, and the joint levels."""
+    at = found.sel(time=worst.time, source=COMBINED)
+    mean = at["mean"].sel(response=outputs).values
+    whole = at["covariance"].sel(response=outputs, other_response=outputs)
+    S = whole.transpose("response", "other_response").values
+    quantities = Quantities.of(sweep.case, [worst.response])
+    (weights,) = wind_weights(sweep.case, [worst.time], quantities.outputs, worst.time - worst.time_met)
+    rows = quantities.rows(gust_products(weights, sweep.climb, worst.gust, np.array([worst.start_altitude]))[0], 0)
+    gusts = np.array([towards(rows, chi) for chi in np.linspace(0, 2 * np.pi, 5 * DIRECTIONS, endpoint=False)])
+    alone = float(NormOfNormal(mean, S).percentile(CHANCE))
+    worst_of_all = float(_law(mean + gusts, S).percentile(CHANCE).max())
+    law = _law(mean + inside_gust(sweep, worst), S)
+
+    def passed(level: float) -> float:
+        return float(np.mean(law.exceedance(level))) - CHANCE
+
+    top = float(np.linalg.norm(law.mean, axis=1).max() + 10 * np.sqrt(np.trace(S)))
+    inside = root_scalar(passed, bracket=(0.0, top), method="brentq", rtol=1e-7, xtol=1e-7 * top).root
+    return {
+        "mean": float(np.linalg.norm(mean)),
+        "gust": abs(worst.value),
+        "joint_worst": worst_of_all,
+        "joint_inside": float(inside),
+        "without_gust": alone,
+    }
+
+
+def _law(means: NDArray[np.float64], covariance: NDArray[np.float64]) -> NormOfNormal:
+    return NormOfNormal(means, np.broadcast_to(covariance, (len(means), 2, 2)))
 
 
 def mixture_level(means: NDArray[np.float64], std: float, chance: float) -> float:

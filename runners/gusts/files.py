@@ -7,6 +7,7 @@ import io
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
 import xarray as xr
 
 from ..present.files import write_text
@@ -45,14 +46,16 @@ def write_gusts(sweeps: Sequence[GustSweep], sheets: Sequence[xr.Dataset], folde
 
 
 def _worst_csv(sweeps: Sequence[GustSweep]) -> str:
-    rows: list[Sequence[object]] = [
-        ("response", "unit", "shape", "amplitude_m_s", "value", "time_s", "length_m", "start_altitude_m", "met_at_s")
-    ]
+    head = ["response", "unit", "shape", "amplitude_m_s", "value", "time_s", "length_m", "start_altitude_m", "met_at_s"]
+    if any(sweep.from_any_direction for sweep in sweeps):
+        head.append("blows_towards_deg")
+    rows: list[Sequence[object]] = [head]
     for sweep in sweeps:
         for name in sweep.responses:
             w = sweep.worst(name)
             numbers = (w.gust.amplitude, w.value, w.time, w.gust.length, w.start_altitude, w.time_met)
-            rows.append((name, w.unit, w.gust.name, *(f"{x:.9g}" for x in numbers)))
+            toward = [] if w.direction is None else [f"{np.degrees(w.direction) % 360:.9g}"]
+            rows.append((name, w.unit, w.gust.name, *(f"{x:.9g}" for x in numbers), *toward))
     return _csv(rows)
 
 
@@ -61,7 +64,8 @@ def _sheet_csv(sheets: Sequence[xr.Dataset]) -> str:
     for sheet in sheets:
         for k, name in enumerate(sheet["response"].values):
             unit, time = str(sheet["unit"].values[k]), float(sheet["time"][k])
-            numbers = (f"{float(sheet[column][k]):.9e}" for column in MEANINGS)
+            values = (float(sheet[column][k]) for column in MEANINGS)
+            numbers = ("" if np.isnan(value) else f"{value:.9e}" for value in values)
             rows.append((str(name), unit, sheet.attrs["gust"], f"{time:.9g}", *numbers))
     return _csv(rows)
 

@@ -14,7 +14,8 @@ from ..case.climb import Climb
 from ..case.provenance import provenance
 from ..case.times import end_times
 from ..present.netcdf import RULE
-from .shapes import Gust, GustError
+from .clocking import Quantities, checked_direction, checked_quantities
+from .shapes import Gust, GustError, checked_gust
 from .weights import WindWeights, wind_weights
 
 # s and points of the weights, at most, of a panel in which the product is integrated as a polynomial of degree 11
@@ -65,8 +66,8 @@ def _integral(spline, climb: Climb, gust: Gust, starts: NDArray, begin: NDArray,
     return found
 
 
-def check_on_flight(climb: Climb, length: float, start: float | None = None) -> None:
-    """Raise if a gust (m) is longer than the flight, or starts (m) where the flight is not.
+def check_length(climb: Climb, length: float) -> None:
+    """Raise if a gust (m) is longer than the flight.
 
     Raises
     ------
@@ -78,10 +79,18 @@ def check_on_flight(climb: Climb, length: float, start: float | None = None) -> 
             f"a gust of {length:g} m is longer than the flight, which climbs from {low:.6g} to {high:.6g} m; make it "
             "shorter"
         )
-    if start is None:
-        return
-    if not np.isfinite(start):
-        raise GustError(f"a gust cannot start at {start!r} m; give an altitude")
+
+
+def check_start(climb: Climb, start: float) -> None:
+    """Raise if a gust starts (m) where the flight is not.
+
+    Raises
+    ------
+    GustError
+    """
+    low, high = float(climb.altitudes[0]), float(climb.altitudes[-1])
+    if isinstance(start, bool) or not isinstance(start, int | float) or abs(start) == np.inf or start != start:
+        raise GustError(f"a gust cannot start at {start!r:.60} m; give an altitude, a number")
     if start < low:
         where = "below the ground" if start < 0 else "below the start of the flight"
         raise GustError(f"the gust starts at {start:g} m, {where}: flight begins at {low:.6g} m; let it start there")
@@ -92,20 +101,28 @@ def check_on_flight(climb: Climb, length: float, start: float | None = None) -> 
 
 
 def gust_response(
-    case: Case, gust: Gust, start_altitude: float, times: Iterable[float], responses: Iterable[str] | None
+    case: Case,
+    gust: Gust,
+    start_altitude: float,
+    times: Iterable[float],
+    responses: Iterable[str] | None,
+    direction: float | None = None,
 ) -> xr.Dataset:
     """See :meth:`Study.gust_response`."""
     climb = Climb.of(case)
-    check_on_flight(climb, gust.length, start_altitude)
-    ends, names = case.checked_times(end_times(times)), checked_responses(case, responses)
+    check_length(climb, checked_gust(gust).length)
+    check_start(climb, start_altitude)
+    ends, names = case.checked_times(end_times(times)), checked_quantities(case, responses)
+    direction, quantities = checked_direction(case, direction), Quantities.of(case, names)
     met = float(climb.time_at(start_altitude))
     found = np.zeros((len(ends), len(names)))
     after = [k for k, time in enumerate(ends) if time > met]
     if after:
-        weights = wind_weights(case, [ends[k] for k in after], names, ends[-1] - met)
+        weights = wind_weights(case, [ends[k] for k in after], quantities.outputs, ends[-1] - met)
         start = np.array([float(start_altitude)])
-        found[after] = [gust_products(each, climb, gust, start)[0] for each in weights]
-    units = [case.system.outputs[case.system.output_index(name)].unit for name in names]
+        products = np.array([gust_products(each, climb, gust, start)[0] for each in weights])
+        found[after] = quantities.towards(products, direction)
+    toward = {} if direction is None else {"direction_rad": direction}
     return xr.Dataset(
         {
             "response_to_gust": (
@@ -117,9 +134,9 @@ def gust_response(
         {
             "time": ("time", ends, {"units": "s", "long_name": "flight time"}),
             "response": names,
-            "unit": ("response", units),
+            "unit": ("response", list(quantities.units)),
         },
-        provenance(case) | described(gust) | {"start_altitude_m": float(start_altitude)},
+        provenance(case) | described(gust) | {"start_altitude_m": float(start_altitude)} | toward,
     )
 
 
@@ -128,18 +145,3 @@ def described(gust: Gust) -> dict[str, object]:
     found: dict[str, object] = {"gust": gust.name, "amplitude_m_s": gust.amplitude, "length_m": gust.length}
     edge = getattr(gust, "edge", None)
     return found if edge is None else found | {"edge_m": edge}
-
-
-def checked_responses(case: Case, responses: Iterable[str] | None) -> list[str]:
-    """Return names of responses, each once; all for None. White noise that reaches one directly does not matter here.
-
-    Raises
-    ------
-    UnknownNameError
-    """
-    if isinstance(responses, str):
-        responses = [responses]
-    names = list(case.system.output_names if responses is None else dict.fromkeys(responses))
-    for name in names:
-        case.system.output_index(name)
-    return names

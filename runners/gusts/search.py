@@ -17,8 +17,9 @@ from ..case.provenance import provenance
 from ..case.times import end_times, parse_times, spread_over
 from ..present.netcdf import RULE
 from ..present.notebook import html_of
-from .response import check_on_flight, checked_responses, described, gust_products, gust_response
-from .shapes import LENGTHS, Gust, GustError
+from .clocking import Quantities, checked_quantities
+from .response import check_length, described, gust_products, gust_response
+from .shapes import LENGTHS, Gust, GustError, checked_gust
 from .weights import WindWeights, wind_weights
 
 LENGTH_COUNT = 13  # from 60 to 300 m every 20 m
@@ -49,6 +50,8 @@ class WorstGust:
         m.
     time_met : float
         At which the vehicle meets the gust, s.
+    direction : float or None
+        Where it blows, rad from north towards east; of a vehicle in both planes.
     """
 
     response: str
@@ -58,6 +61,7 @@ class WorstGust:
     gust: Gust
     start_altitude: float
     time_met: float
+    direction: float | None = None
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -90,8 +94,12 @@ class GustSweep:
     @cached_property
     def units(self) -> tuple[str, ...]:
         """Of the responses."""
-        outputs = self.case.system.outputs
-        return tuple(outputs[self.case.system.output_index(name)].unit for name in self.responses)
+        return Quantities.of(self.case, self.responses).units
+
+    @property
+    def from_any_direction(self) -> bool:
+        """Whether the vehicle flies in both planes, where of every gust the worst direction is taken."""
+        return len(self.case.wind_inputs("a gust")) > 1
 
     @cached_property
     def dataset(self) -> xr.Dataset:
@@ -99,15 +107,18 @@ class GustSweep:
 
         ``largest`` is signed as the amplitude of the gust makes it, the other sign comes with a gust from the other
         side; ``start_altitude`` is where that gust starts, and ``at_edge`` is 1 where the largest response of all
-        lengths was found for the earliest start that could be looked at.
+        lengths was found for the earliest start that could be looked at. In both planes gusts blow from any direction:
+        ``largest`` is a size, and ``direction`` where that gust blows.
         """
         found = [self._at(weights, self.responses) for weights in self._weights(self.times, self.responses)]
-        largest, starts, edge = (np.array(part) for part in zip(*found, strict=True))
+        largest, starts, edge, directions = (np.array(part) for part in zip(*found, strict=True))
         dims = ("time", "response", "length")
+        turned = {"units": "rad", "long_name": "where that gust blows, from north towards east"}
         return xr.Dataset(
             {
                 "largest": (dims, largest, {RULE: "response", "long_name": "largest response to the gust alone"}),
                 "start_altitude": (dims, starts, {"units": "m", "long_name": "altitude at which that gust starts"}),
+                **({"direction": (dims, directions, turned)} if self.from_any_direction else {}),
                 "at_edge": (dims[:2], edge.astype(int), {"units": "1", "long_name": "1 at the edge of the search"}),
             },
             {
@@ -136,7 +147,7 @@ class GustSweep:
         UnknownNameError, IntegrationError
         """
         if response not in self.responses:
-            raise UnknownNameError("response", response, self.responses)
+            raise UnknownNameError("response of the sweep", response, self.responses)
         return self._worst[response]
 
     @cached_property
@@ -151,7 +162,8 @@ class GustSweep:
         return float((self.times - climb.time_at(at - lengths)).max())
 
     def _weights(self, times: Sequence[float] | NDArray[np.float64], responses: Sequence[str]) -> list[WindWeights]:
-        return wind_weights(self.case, [float(t) for t in times], responses, self.longest + AFTER)
+        outputs = Quantities.of(self.case, responses).outputs
+        return wind_weights(self.case, [float(t) for t in times], outputs, self.longest + AFTER)
 
     def _step(self, time: float) -> float:
         """Return the distance between starts, s."""
@@ -164,20 +176,26 @@ class GustSweep:
         count = int(min(MOST_STARTS, np.ceil(span / self._step(weights.time)))) + 1
         return self.climb.altitude(weights.time - np.linspace(0.0, span, count))
 
-    def _at(self, weights: WindWeights, names: Sequence[str]) -> tuple[NDArray, NDArray, NDArray]:
-        """Return largest responses and their starts, (r, q), and whether the search ended too early, (r,)."""
+    def _at(self, weights: WindWeights, names: Sequence[str]) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+        """Return largest responses and their starts, (r, q), if the search ended too early, (r,), and directions."""
+        quantities = Quantities.of(self.case, names)
         time, span, starts = weights.time, weights.time - weights.begin, self.starts(weights)
-        found = np.array(
+        products = np.array(
             [gust_products(weights, self.climb, replace(self.gust, length=L), starts) for L in self.lengths]
         )
+        found = quantities.sizes(products)
         best = np.abs(found).argmax(axis=1)  # (q, r), of (q, starts, r)
         largest = np.take_along_axis(found, best[:, None], axis=1)[:, 0].T
         of_all = best.T[np.arange(len(names)), np.abs(largest).argmax(axis=1)]
         edge = (of_all >= starts.size - 2) & (np.abs(largest).max(axis=1) > 0)
         earliest = max(self.case.system.start, time - self.longest - FARTHEST)
         if edge.any() and weights.begin > earliest:
-            return self._at(wind_weights(self.case, [time], names, min(2 * span, time - earliest))[0], names)
-        return largest, starts[best].T, edge
+            more = wind_weights(self.case, [time], quantities.outputs, min(2 * span, time - earliest))
+            return self._at(more[0], names)
+        directions = np.zeros_like(largest)
+        if self.from_any_direction:
+            directions = np.take_along_axis(quantities.directions(products), best[:, None], axis=1)[:, 0].T
+        return largest, starts[best].T, edge, directions
 
     def _located(self, name: str) -> WorstGust:
         at = self.responses.index(name)
@@ -197,26 +215,29 @@ class GustSweep:
 
     def _zoomed(self, weights: WindWeights, name: str) -> WorstGust:
         """Return the worst gust for one response at one time."""
-        largest, starts, _ = self._at(weights, [name])
+        quantities = Quantities.of(self.case, [name])
+        largest, starts, _, directions = self._at(weights, [name])
         q = int(np.abs(largest[0]).argmax())
         length, met = float(self.lengths[q]), float(self.climb.time_at(starts[0, q]))
         low, high = float(self.lengths.min()), float(self.lengths.max())
         wide = float(np.diff(self.lengths).max()) if self.lengths.size > 1 else 0.0
-        step, value = self._step(weights.time), float(largest[0, q])
+        step, value, direction = self._step(weights.time), float(largest[0, q]), float(directions[0, q])
         for _ in range(ZOOMS):
             tries = np.unique(np.clip(length + wide * np.linspace(-1, 1, ZOOM), low, high))
             times = np.unique(np.clip(met + step * np.linspace(-1, 1, ZOOM), weights.begin, weights.time))
             at = self.climb.altitude(times)
-            found = np.array(
-                [gust_products(weights, self.climb, replace(self.gust, length=L), at)[:, 0] for L in tries]
-            )
+            products = np.array([gust_products(weights, self.climb, replace(self.gust, length=L), at) for L in tries])
+            found = quantities.sizes(products)[..., 0]
             i, j = np.unravel_index(int(np.abs(found).argmax()), found.shape)
             if abs(found[i, j]) >= abs(value):
                 length, met, value = float(tries[i]), float(times[j]), float(found[i, j])
+                if self.from_any_direction:
+                    direction = float(quantities.directions(products[i, j])[0])
             wide, step = wide / FINER, step / FINER
         unit = self.units[self.responses.index(name)]
         start = float(self.climb.altitude(met))
-        return WorstGust(name, unit, value, weights.time, replace(self.gust, length=length), start, met)
+        gust, toward = replace(self.gust, length=length), direction if self.from_any_direction else None
+        return WorstGust(name, unit, value, weights.time, gust, start, met, toward)
 
     def over_time(self, response: str) -> xr.Dataset:
         """Return a response to its worst gust, from before that is met on.
@@ -237,7 +258,7 @@ class GustSweep:
         worst = self.worst(response)
         low = max(self.case.system.start, worst.time_met - AROUND[0])
         ends = np.linspace(low, min(self.case.system.end, worst.time + AROUND[1]), POINTS)
-        return gust_response(self.case, worst.gust, worst.start_altitude, ends, [response])
+        return gust_response(self.case, worst.gust, worst.start_altitude, ends, [response], worst.direction)
 
     def __repr__(self) -> str:
         lines = [
@@ -245,9 +266,10 @@ class GustSweep:
             f"{self.lengths.max():g} m, {self.times[0]:g} to {self.times[-1]:g} s"
         ]
         for worst in self._worst.values():
+            toward = "" if worst.direction is None else f" towards {np.degrees(worst.direction) % 360:.0f} degrees"
             lines.append(
                 f"{worst.response}: {worst.value:.5g} {worst.unit} at {worst.time:.5g} s, length "
-                f"{worst.gust.length:.4g} m from {worst.start_altitude:.6g} m"
+                f"{worst.gust.length:.4g} m from {worst.start_altitude:.6g} m{toward}"
             )
         return "\n  ".join(lines)
 
@@ -263,14 +285,14 @@ def gust_sweep(
     lengths: Iterable[float] | None,
 ) -> GustSweep:
     """See :meth:`Study.gust_sweep`."""
-    climb = Climb.of(case)
-    names = checked_responses(case, responses)
+    climb, gust = Climb.of(case), checked_gust(gust)
+    names = checked_quantities(case, responses)
     if times is None:
         vehicle = case.vehicle_for("a gust")
         times = spread_over(parse_times(vehicle.file.default_times), TIMES)
     ends = np.array(case.checked_times(end_times(times)))
     found = _checked_lengths(gust, lengths)
-    check_on_flight(climb, float(found.max()))
+    check_length(climb, float(found.max()))
     return GustSweep(case, gust, found, ends, tuple(names))
 
 

@@ -7,7 +7,7 @@ m; ``holds``: the wind stays what it is at the last corner, where it is zero bey
 
 from __future__ import annotations
 
-import math
+import sys
 from dataclasses import dataclass
 
 import numpy as np
@@ -99,8 +99,8 @@ class QuasiSquare:
 
     def __post_init__(self) -> None:
         _check(self)
-        if not (math.isfinite(self.edge) and self.edge >= 0):
-            raise GustError(f"the edges of a gust cannot be {self.edge:g} m long; give zero or more, such as 30")
+        if not (_is_number(self.edge) and self.edge >= 0):
+            raise GustError(f"the edges of a gust cannot be {self.edge!r:.60} m long; give zero or more, such as 30")
         if self.length < 2 * self.edge:
             raise GustError(
                 f"a quasi-square gust of {self.length:g} m has no room for two edges of {self.edge:g} m; make it at "
@@ -187,15 +187,31 @@ Gust = OneMinusCosine | QuasiSquare | RampAndHold
 SHAPES: dict[str, type[Gust]] = {shape.name: shape for shape in (OneMinusCosine, QuasiSquare, RampAndHold)}
 
 
+def checked_gust(gust: object) -> Gust:
+    """Return a gust, if it is one.
+
+    Raises
+    ------
+    GustError
+    """
+    if not isinstance(gust, Gust):
+        raise GustError(f"{gust!r:.60} is no gust; give a shape: OneMinusCosine(), QuasiSquare() or RampAndHold()")
+    return gust
+
+
 def _rise(distance: NDArray[np.float64], over: float) -> NDArray[np.float64]:
     return 0.5 * (1 - np.cos(np.pi * np.clip(distance / over, 0.0, 1.0)))
+
+
+def _is_number(value: object) -> bool:
+    return not isinstance(value, bool) and isinstance(value, int | float) and abs(value) <= sys.float_info.max
 
 
 def _check(gust: Gust) -> None:
     """Raise if a length or an amplitude is none."""
     for what, value in (("length", gust.length), ("amplitude", gust.amplitude)):
-        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-            raise GustError(f"the {what} of a gust cannot be {value!r}; give a number")
+        if not _is_number(value):
+            raise GustError(f"the {what} of a gust cannot be {value!r:.60}; give a number")
     if not gust.length > 0:
         raise GustError(f"a gust of {gust.length:g} m has no extent; give a positive length, such as 150 m")
     if not gust.amplitude:

@@ -1,8 +1,8 @@
 """Weighting functions of the wind: what an impulse of wind at t puts into responses at t2, between points too.
 
 A row c of the states at t2 and its adjoint lambda(t) = Phi(t2, t)' c give g(t) = lambda' E, smooth between the jumps
-of a flight, and the wind at t2 itself the weight G. With gust penetration each zone of the vehicle would have its own
-column of E and G, and its own delay; here the whole vehicle feels the wind at once.
+of a flight, and the wind at t2 itself the weight G. A vehicle in both planes has them for both components of the wind,
+one after the other for each quantity.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ DEGREE = 5  # of the splines between points
 
 @dataclass(frozen=True, eq=False)
 class WindWeights:
-    """Weights of the wind for r quantities at one time.
+    """Weights of the wind for r quantities at one time; in both planes r counts each quantity twice, by components.
 
     Attributes
     ----------
@@ -135,13 +135,13 @@ def wind_weights(
 def _weights_of_outputs(
     case: Case, times: Sequence[float], rows: list[int], reach: float, spacing: float | None
 ) -> list[WindWeights]:
-    executable, wind = case.with_means, case.wind_input("a gust")
+    executable, winds = case.with_means, case.wind_inputs("a gust")
     evaluate = MatrixEvaluator(executable, ("C", "G"))
     ends = []
     for node in time_nodes(executable, times):
         here = interval_before(executable, float(node))
         C, G = evaluate(float(node), here.low, here.high)
-        ends.append((C[rows], G[rows, wind]))
+        ends.append((C[rows], G[np.ix_(rows, winds)]))
     return weights_of_rows(case, times, ends, reach, spacing)
 
 
@@ -159,7 +159,7 @@ def weights_of_rows(
     case, times, reach, spacing
         As for :func:`wind_weights`.
     ends : sequence of (array, array)
-        Rows (r, n) of the states and (r,) of the wind, at each time.
+        Rows (r, n) of the states and (r, winds) of the wind or both its components, at each time.
 
     Raises
     ------
@@ -189,8 +189,8 @@ class WeightGrid:
         Between jumps.
     transition : (m - 1, n, n) array
         Phi of each step.
-    inputs : tuple of (k, n) arrays
-        E of the wind at the points of each piece, its ends from inside.
+    inputs : tuple of (k, n, winds) arrays
+        E of the wind or both its components at the points of each piece, its ends from inside.
     layers : dict of float to Layer
         Of each node, s.
     """
@@ -204,7 +204,7 @@ class WeightGrid:
     @classmethod
     def of(cls, case: Case, begin: float, nodes: NDArray[np.float64], spacing: float) -> WeightGrid:
         """Return points at most ``spacing`` (s) apart from ``begin`` (s) on, the nodes (s) among them."""
-        executable, wind = case.with_means, case.wind_input("a gust")
+        executable, winds = case.with_means, case.wind_inputs("a gust")
         pieces = tuple(intervals(executable, begin, float(nodes[-1]))) if nodes[-1] > begin else ()
         marks = np.unique([begin, *nodes.tolist(), *(piece.end for piece in pieces)])
         parts, layers = [], {float(node): Layer.of(case, float(node), spacing) for node in nodes}
@@ -218,7 +218,7 @@ class WeightGrid:
         for piece in pieces:
             at = times[(times >= piece.begin) & (times <= piece.end)]
             steps += [Interval(a, b, piece.low, piece.high) for a, b in pairwise(at.tolist())]
-            inputs.append(executable.input_matrices(at, piece.low, piece.high)[1][:, :, wind])
+            inputs.append(executable.input_matrices(at, piece.low, piece.high)[1][:, :, winds])
         n = len(case.system.states)
         transition = exact_transitions(executable, steps) if steps else np.zeros((0, n, n))
         return cls(times, pieces, transition, tuple(inputs), layers)
@@ -231,7 +231,7 @@ class WeightGrid:
         return np.array(found[::-1])
 
     def weights(self, node: float, begin: float, rows: NDArray[np.float64], direct: NDArray[np.float64]) -> WindWeights:
-        """Return the weights at a node (s), from ``begin`` (s) on, of rows (r, n) of the states, (r,) of the wind."""
+        """Return the weights at a node (s), from ``begin`` (s) on, of rows of the states and the wind."""
         last = int(np.searchsorted(self.times, node))
         first = max(0, int(np.searchsorted(self.times, begin, side="right")) - 1)
         adjoint, splines, edges = self.adjoint(rows, last, first), [], [float(self.times[first])]
@@ -241,8 +241,8 @@ class WeightGrid:
             if mine.sum() < 2:
                 continue
             at = self.times[whole[mine]]
-            values = np.einsum("krn,kn->kr", adjoint[whole[mine] - first], E[mine])
+            values = np.einsum("krn,knc->krc", adjoint[whole[mine] - first], E[mine]).reshape(at.size, -1)
             cut = [x for x in self.layers[node].cuts if at[0] < x < at[-1]]
             splines += [make_interp_spline(at, values, k=DEGREE if at.size > DEGREE else 1)] * (1 + len(cut))
             edges += [*cut, float(at[-1])]
-        return WindWeights(node, tuple(splines), np.array(edges), direct)
+        return WindWeights(node, tuple(splines), np.array(edges), direct.ravel())

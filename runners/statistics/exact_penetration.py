@@ -27,6 +27,7 @@ from ...codegen.system.evaluation import MatrixEvaluator
 from ...model.equations.penetration import DELAYS
 from ...model.errors import DataError
 from ...model.system.names import TURBULENCE, WIND
+from ...model.vehicle.planes import one_wind
 from ...model.vehicle.vehicle import Vehicle
 from ...model.wind.shaping_filter import ShapingFilter
 from ...model.wind.turbulence import turbulence_filter
@@ -96,11 +97,14 @@ def check_gust_penetration(case: Case, time: float) -> xr.Dataset:
     ------
     DataError
         The whole vehicle feels one wind, or turbulence is correlated with it.
+    PlanesError
+        It flies in both planes, each of which has the delays of one alone.
     NoVehicleError, TimeRangeError, IntegrationError
     """
     vehicle = case.vehicle_for("gust penetration")
     if vehicle.zones is None:
         raise DataError("the whole vehicle feels one wind: it has no gust zones; set options.gust_zones")
+    one_wind(vehicle, "gust penetration by exact delays")
     if vehicle.turbulence is not None and vehicle.turbulence.correlation is not None:
         raise DataError("turbulence is correlated with the wind; exact delays take one source after the other")
     (end,) = case.checked_times([time])

@@ -36,11 +36,13 @@ def rows(system, prefix: str, names) -> list[int]:
     return [system.state_names.index(prefix + name) for name in names]
 
 
+@pytest.mark.parametrize("zones", [1, 5])
 @pytest.mark.parametrize(("plane", "component"), [("yaw", "zonal"), ("pitch", "meridional")])
-def test_azimuth_zero_with_a_deviation_each_is_the_plane_alone(plane, component):
+def test_azimuth_zero_with_a_deviation_each_is_the_plane_alone(plane, component, zones):
     """At azimuth 0 yaw meets u and pitch meets v: every entry of every matrix is that of the plane alone."""
-    joint = study(in_both(HORIZONTAL | EACH, independent=True)).with_parameters({"wind.azimuth": 0.0})
-    alone = study(in_one(plane, component, HORIZONTAL))
+    changes = HORIZONTAL | {"options.gust_zones": zones}
+    joint = study(in_both(changes | EACH, independent=True)).with_parameters({"wind.azimuth": 0.0})
+    alone = study(in_one(plane, component, changes))
     system, single = joint.system, alone.system
     own = [name for name in single.state_names if not name.startswith(("wind", "deviation"))]
     first = 0 if component == "zonal" else 3

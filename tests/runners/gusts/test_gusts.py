@@ -201,7 +201,7 @@ def test_combined_sheet(as504, small_sweep):
     assert found["without_gust"] < found["root_sum_square"] < found["joint_worst"]
     # by simulation of the same law
     random = np.random.default_rng(7)
-    drawn = found["mean"] + random.choice(inside_gust(small_sweep, worst), 400_000)
+    drawn = found["mean"] + random.choice(inside_gust(small_sweep, worst)[:, 0], 400_000)
     drawn = np.abs(drawn + sigma * random.standard_normal(drawn.size))
     passed = (drawn > found["joint_inside"]).mean()
     assert abs(passed - 0.00135) < 4 * math.sqrt(0.00135 / drawn.size)
