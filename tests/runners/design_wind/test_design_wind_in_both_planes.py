@@ -18,8 +18,8 @@ TIME, PLANES = 70.0, ("pitch_bending_moment", "yaw_bending_moment")
 
 
 @pytest.fixture(scope="module")
-def both() -> aw.Study:
-    return aw.Study.from_vehicle(in_both({"options.gust_zones": 5}), compile=False)
+def both(cache) -> aw.Study:
+    return aw.Study.load("as504", changes={"planes": "both"})
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +61,7 @@ def test_flown_back_it_makes_the_load_of_a_plane(both):
 
 def test_the_load_is_the_level_of_the_norm(both, behind):
     """That the resultant passes by 1 - Phi(3) in the wind alone; the least white noise behind it is of that size."""
-    known = both.response_statistics([TIME], responses=PLANES, engine="covariance")
+    known = both.response_statistics([TIME], responses=PLANES)
     mean = known.mean.sel(source="combined").squeeze().values
     S = known["covariance"].sel(source="wind").squeeze().values
     random = np.random.default_rng(1)
