@@ -11,6 +11,8 @@ from matplotlib import rc_context
 from ..present.style import COLORS, SHADES, STYLE, Figure, display, words, wrapped
 from .search import GustSweep, WorstGust
 
+MARGIN = 1.08  # above the largest, for its dot
+
 
 def gust_figure(sweeps: Sequence[GustSweep], responses: Sequence[xr.Dataset], name: str, title: str) -> Figure:
     """Return the largest response over length, and over time that to the worst gust of each shape.
@@ -43,7 +45,8 @@ def gust_figure(sweeps: Sequence[GustSweep], responses: Sequence[xr.Dataset], na
             label = f"{each.gust.length:.0f} m from {each.start_altitude / 1000:.2f} km"
             below.plot(over_time["time"] - each.time_met, factor * values, color=color, lw=1.8, label=label)
         amplitude = abs(sweeps[0].gust.amplitude)
-        above.set(xlabel="length of the gust (m)", ylabel=f"|{words(name)}| ({unit})", ylim=(0, None))
+        top = MARGIN * max(factor * abs(each.value) for each in worst)
+        above.set(xlabel="length of the gust (m)", ylabel=f"|{words(name)}| ({unit})", ylim=(0, top))
         above.set_title("largest of all altitudes and times; dots: located between them", fontsize=10)
         above.legend()
         below.axhline(0.0, color=COLORS["mean"], lw=0.8)

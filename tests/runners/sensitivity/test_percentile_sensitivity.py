@@ -116,8 +116,6 @@ def test_refused_of_both(both):
         both.percentile_sensitivity("resultant_bending_moment", 75.0, 1.5)
     with pytest.raises(TimeRangeError):
         both.percentile_sensitivity("resultant_bending_moment", 500.0)
-    with pytest.raises(PlanesError, match="a design wind"):
-        both.design_wind("yaw_bending_moment", 75.0)
 
 
 def test_all_derivatives_cost_one_law_one_flight_and_two_adjoint_pairs(swelling, monkeypatch):
