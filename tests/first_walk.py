@@ -50,7 +50,8 @@ def walk(wheel: Path, folder: Path) -> None:
     if INSTALL not in index[0].text:
         sys.exit(f"docs/index.md does not begin with an installation of {INSTALL}")
     for block in (*index, *vehicle):
-        if block.kind not in ("sh", "python"):
+        left_out = block.why_not is not None and block is not index[0]  # the installation is run here alone
+        if block.kind not in ("sh", "python") or left_out:
             continue
         print(f"-- {block.page.name}, line {block.line}", flush=True)
         done = subprocess.run(
