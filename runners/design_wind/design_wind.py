@@ -383,7 +383,7 @@ def _behind(
     by_source = _covariances(found.dataset, outputs)
     factors, direction = np.ones(1), None
     if len(rows) > 1:
-        law = NormOfNormal(means, sum(by_source.values()) if combined else by_source[WIND])
+        law = NormOfNormal(means, sum(by_source.values(), np.zeros((1, 1))) if combined else by_source[WIND])
         level = float(law.percentile(float(norm.sf(sigmas)))) if level is None else level
         direction = float(law.direction(level).most_likely)
         factors = np.array([math.cos(direction), math.sin(direction)])

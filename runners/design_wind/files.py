@@ -35,7 +35,8 @@ def write_wind(case: Case, altitude: np.ndarray, wind: np.ndarray, path: Path) -
     """
     vehicle = case.vehicle_for("a design wind")
     if vehicle.file.planes == BOTH:
-        return _write(altitude, *np.asarray(wind, float).T, path)
+        both = np.asarray(wind, float)
+        return _write(altitude, both[:, 0], both[:, 1], path)
     record = vehicle.wind.record
     if record is None:
         raise DataError(

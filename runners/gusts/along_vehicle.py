@@ -38,7 +38,7 @@ def gust_along_vehicle(
     Returns
     -------
     xarray.Dataset
-        ``in_worst_gust`` of that gust, and ``envelope``, the largest size of any gust of the sweep's lengths, with its
+        ``in_worst_gust`` of that gust, and ``envelope``, the largest size in it or any gust of the sweep, with its
         ``length`` and ``start_altitude``; in both planes of gusts from any direction.
 
     Raises
@@ -64,13 +64,19 @@ def gust_along_vehicle(
     flat = np.abs(found).reshape(-1, found.shape[2])
     best = flat.argmax(axis=0)
     q, p = np.unravel_index(best, found.shape[:2])
+    envelope, length, start = flat.max(axis=0), sweep.lengths[q], starts[p]
+    farther = np.abs(own) > envelope  # the worst gust is sought between the lengths and altitudes of the sweep
+    envelope, length, start = (
+        np.where(farther, new, old)
+        for new, old in ((np.abs(own), envelope), (worst.gust.length, length), (worst.start_altitude, start))
+    )
     units = {"units": rows.unit}
     return xr.Dataset(
         {
             "in_worst_gust": ("station", own, units | {"long_name": f"in the gust that is worst for {worst.response}"}),
-            "envelope": ("station", flat.max(axis=0), units | {"long_name": "largest size in any gust"}),
-            "length": ("station", sweep.lengths[q], {"units": "m", "long_name": "length of that gust"}),
-            "start_altitude": ("station", starts[p], {"units": "m", "long_name": "altitude at which it starts"}),
+            "envelope": ("station", envelope, units | {"long_name": "largest size in any gust"}),
+            "length": ("station", length, {"units": "m", "long_name": "length of that gust"}),
+            "start_altitude": ("station", start, {"units": "m", "long_name": "altitude at which it starts"}),
         },
         {
             "station": ("station", rows.station, {"units": "m", "long_name": "vehicle station"}),

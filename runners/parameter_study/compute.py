@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from threading import Lock
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -228,5 +229,5 @@ def empty_result(study: Study, task: Task, members: int, reason: str = "") -> Ch
         "plane_covariance": (resultants, sources, 2, 2),
         "level": (resultants,),
     }
-    nothing = {name: np.full((*over, *shape), np.nan) for name, shape in shapes.items()}
+    nothing: dict[str, Any] = {name: np.full((*over, *shape), np.nan) for name, shape in shapes.items()}
     return ChunkResult(**nothing, status=np.full(members, FAILED, np.int8), reason=(reason,) * members)

@@ -92,8 +92,9 @@ class ChunkStore:
             return None
         try:
             with xr.open_dataset(path, engine="scipy") as stored:
+                numbers: dict[str, Any] = {name: _values(stored, name) for name in DIMENSIONS}
                 result = ChunkResult(
-                    **{name: _values(stored, name) for name in DIMENSIONS},
+                    **numbers,
                     status=stored["status"].values.astype(np.int8),
                     reason=tuple(json.loads(stored.attrs["reason"])),
                 )

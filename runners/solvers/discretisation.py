@@ -226,10 +226,12 @@ def _substeps(
         of = np.array([leaf.piece for leaf in batch])
         wide = np.array([leaf.span for leaf in batch])[:, None, None]
         M, B = (np.stack([getattr(leaf, name) for leaf in batch], axis=1) for name in ("M", "B"))
+        M = _with_straight_inputs(M, wide)
         exponent = 0.5 * wide * (M[0] + M[1]) + np.sqrt(3) / 12 * wide**2 * (M[1] @ M[0] - M[0] @ M[1])
         Phi, Q = _added_covariance(exponent, 0.5 * (B[0] + B[1]) * np.sqrt(wide), columns)
         for piece in np.unique(of):
-            part = tuple(x[of == piece] for x in (Phi[:, :n, :n], Q, Phi[:, :n, n]))
+            forced = Phi[:, :n, n + 1] - 0.5 * Phi[:, :n, n]
+            part = tuple(x[of == piece] for x in (Phi[:, :n, :n], Q, forced))
             while (count := part[0].shape[0]) > 1:
                 even = count - count % 2
                 pairs = _compose(tuple(x[:even:2] for x in part), tuple(x[1:even:2] for x in part))
@@ -241,6 +243,21 @@ def _substeps(
             done += 1
     if done in carried:
         yield carried.pop(done)  # type: ignore[misc]
+
+
+def _with_straight_inputs(M: NDArray[np.float64], wide: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return matrices (2, k, n + 2, n + 2) of the states, the part of the substep gone from its middle, and one.
+
+    Known inputs are straight lines through both Gauss points. Averages of them would do for slow states only: what is
+    fast against the substep, such as the delay of a gust from zone to zone, follows them as they rise.
+    """
+    n = M.shape[-1] - 1
+    found = np.zeros((*M.shape[:2], n + 2, n + 2))
+    found[..., :n, :n] = M[..., :n, :n]
+    found[..., :n, n] = np.sqrt(3) * (M[1, :, :n, n] - M[0, :, :n, n])
+    found[..., :n, n + 1] = 0.5 * (M[0, :, :n, n] + M[1, :, :n, n])
+    found[..., n, n + 1] = 1 / wide[:, 0, 0]
+    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -298,7 +315,7 @@ def _leaves(
 def _added_covariance(
     exponent: NDArray, B: NDArray, columns: list[list[int]]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return e^exponent (k, n + 1, n + 1) and the covariances (k, sources, n, n) added over a substep.
+    """Return e^exponent (k, n + 2, n + 2) and the covariances (k, sources, n, n) added over a substep.
 
     ``B`` comes multiplied by the square root of the span.
     """
@@ -314,7 +331,7 @@ def _added_covariance(
         for s, of_source in enumerate(columns):
             b = carried[:, :, of_source]
             Q[:, s] += 0.5 * weight / 2**doublings * (b @ b.transpose(0, 2, 1))
-    Phi = _exponential(part, np.eye(n + 1))
+    Phi = _exponential(part, np.eye(n + 2))
     for _ in range(doublings):
         A = Phi[:, None, :n, :n]
         Q = Q + A @ Q @ A.swapaxes(2, 3)

@@ -27,7 +27,8 @@ from .sampling_interval import SamplingInterval, instant_sampling_interval
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
+
+    from ..present.style import Figure
 
 
 @dataclass(frozen=True, eq=False, repr=False)

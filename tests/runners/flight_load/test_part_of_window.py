@@ -18,7 +18,7 @@ from ascentwind.runners.flight_load.window import window_chain
 def humps(*spans: tuple[float, float, float], rest: float = 0.01) -> Study:
     """y = sum f_i(t) x_i, x_i stationary of unit variance, f_i a size within a span of time, else less."""
     t = ca.SX.sym("t")
-    states, noises, y, start = {}, {}, 0, {}
+    states, noises, y, start = {}, {}, ca.SX(0), {}
     for k, (begin, end, size) in enumerate(spans):
         x, n = ca.SX.sym(f"x{k}"), ca.SX.sym(f"n{k}")
         states[f"x{k}"], noises[f"n{k}"] = (x, -x + np.sqrt(2) * n), n

@@ -289,6 +289,7 @@ def test_the_recursive_predictor_is_the_batch(as504, error):
 def test_balloons_that_do_not_go_together(as504):
     """Of two stations; dated otherwise than their hours before launch say, by less than the hour of a file or more."""
     first = balloon(as504)  # of 12:00
+    assert first.time is not None
     launch = asked(as504, first, 6.0)
     with pytest.raises(SoundingError, match="of station 'B', and balloon of 'A'; take balloons of one station"):
         asked(as504, [replace(first, station="A"), replace(first, station="B", time=None)], [6.0, 2.0])

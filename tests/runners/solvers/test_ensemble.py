@@ -98,6 +98,18 @@ def test_halving_the_substep_quarters_the_error(study):
     assert 3.0 < errors[0] / errors[1] < 5.5
 
 
+def test_what_is_fast_follows_a_known_input_that_rises():
+    """x' = (t - x) / T from rest: t - T + T e^(-t / T), T a fiftieth of the substep."""
+    t, x, a, u, T = *(ca.SX.sym(s) for s in ("t", "x", "a", "u")), 1e-3
+    lag = define_system(
+        "lag", time=t, states={"x": (x, (u - x) / T + a)}, noises={"a": a}, inputs={"u": (u, t)}, outputs={"y": u - x},
+        end=3.0,
+    )  # fmt: skip
+    times = np.array([0.002, 0.37, 3.0])
+    found = discretise(Study.from_system(lag).executable, times.tolist(), 0.05)
+    np.testing.assert_allclose(found.mean[:, 0], T - T * np.exp(-times / T), rtol=1e-10)
+
+
 @pytest.mark.slow
 def test_steps_of_as504_meet_the_adjoint(as504):
     """Behind a gain switch too; far below the sampling error of any ensemble one would run."""

@@ -29,7 +29,7 @@ def constant(A, B, C, push=0.0):
     x, w, u = ca.SX.sym("x", n), ca.SX.sym("w", B.shape[1]), ca.SX.sym("u")
     rate = [sum((A[i, j] * x[j] for j in range(n) if A[i, j]), ca.SX(0)) for i in range(n)]
     rate = [rate[i] + sum(B[i, k] * w[k] for k in range(B.shape[1]) if B[i, k]) + push * u for i in range(n)]
-    outputs = {f"y{r}": sum(C[r, j] * x[j] for j in range(n) if C[r, j]) for r in range(len(C))}
+    outputs = {f"y{r}": sum((C[r, j] * x[j] for j in range(n) if C[r, j]), ca.SX(0)) for r in range(len(C))}
     return define_system(
         "constant", time=t, states={f"x{i}": (x[i], rate[i]) for i in range(n)},
         noises={f"w{k}": w[k] for k in range(B.shape[1])}, outputs=outputs, inputs={"push": (u, 1.0)}, end=4.0,
@@ -88,6 +88,7 @@ def run(system, count, ends=ENDS):
 def test_is_what_matrix_exponentials_say(case):
     A, B, C = CASES[case]
     found = run(constant(A, B, C, push=0.3), 61)  # more than are eliminated side by side, and not a multiple
+    assert found.transition is not None
     for k, time in enumerate(ENDS):
         for s in range(B.shape[1]):
             expected = exact(A, B[:, s], C, time)
@@ -161,6 +162,7 @@ def test_the_rule_looks_at_the_fastest_root_wherever_it_is():
     executable = executable_system(tuned())
     compiled = sweep_of(executable)
     rule = rule_for(compiled, executable, np.arange(1.0, 31.0), relative_tolerance=1e-4)
+    assert rule is not None
     np.testing.assert_allclose(rule.roots, 7.0, rtol=1e-3)
     segments = Segments(0.0, np.array([30.0]), np.zeros(1), np.full(1, 30.0))
     assert step_rule(compiled, executable, segments, 1e-4, explicit_steps=1) is None
