@@ -268,7 +268,7 @@ def test_a_jet_of_99_metres_a_second_is_wind(tmp_path):
         (7, 160.0, r"no wind: 160 m/s at 9000 m \(7, line 17\)"),
         (7, -513.93, r"-513.93 m/s at 9000 m"),  # -999 knots
         (7, 55.0, r"55 m/s at 9000 m \(7, line 17\)"),
-        (slice(0, 8), 55.0, r"and 3 more; correct them"),
+        (slice(0, 8), 55.0, r"and 3 more; are these knots under another unit\? Correct them"),
     ],
 )
 def test_outliers_are_refused_with_their_lines(tmp_path, row, value, says):

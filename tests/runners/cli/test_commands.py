@@ -26,6 +26,20 @@ times = "70,75"
 [parameters]
 "control.T1.gain" = [0.9, 1.1]
 """
+STUDY = """format = 1
+title = "gains"
+vehicle = "as504"
+times = "70,75"
+[dispersion]
+members = 2
+seed = 1
+[[dispersion.quantity]]
+name = "gain"
+parameters = ["control.T1.gain"]
+relative = true
+distribution = "normal"
+sigma = 0.1
+"""
 TAKE_CHANGES = [
     ["run", "as504"],
     ["verify", "as504"],
@@ -42,6 +56,7 @@ TAKE_CHANGES = [
     ["equations"],
     ["regenerate", "as504"],
     ["design", "design.toml"],
+    ["study", "study.toml"],
     ["wind", "compare", "as504"],
 ]
 
@@ -55,6 +70,7 @@ def changes_asked_for(monkeypatch, tmp_path):
     """Return with which changes a command loads its vehicle."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "design.toml").write_text(DESIGN)
+    (tmp_path / "study.toml").write_text(STUDY)
     (tmp_path / "limit.csv").write_text("time [s],bending_moment [N m]\n0,2e7\n150,2e7\n")
     (tmp_path / "wind.csv").write_text("altitude [m],u [m/s],v [m/s]\n0,3,0\n9000,30,0\n")
 
@@ -68,7 +84,7 @@ def changes_asked_for(monkeypatch, tmp_path):
         assert isinstance(found.exception, Asked), found.output
         vehicle, changes = found.exception.args
         assert vehicle == "as504"
-        assert {p.name for p in tmp_path.iterdir()} == {"design.toml", "limit.csv", "wind.csv"}, (
+        assert {p.name for p in tmp_path.iterdir()} == {"design.toml", "study.toml", "limit.csv", "wind.csv"}, (
             "a folder was made before the vehicle is known"
         )
         return changes

@@ -207,7 +207,7 @@ def test_no_moment_loses_it(moment):
         moment()
         for future in futures:
             with pytest.raises(KeyboardInterrupt):
-                future.result(timeout=10.0)
+                future.result(timeout=60.0)
         with pytest.raises(KeyboardInterrupt):
             pool.submit(int)
     assert all(future.done() for future in futures)
@@ -236,7 +236,7 @@ def test_pools_within_each_other_all_stop():
         signal.raise_signal(signal.SIGINT)
         for future in waiting:
             with pytest.raises(KeyboardInterrupt):
-                future.result(timeout=10.0)
+                future.result(timeout=60.0)
     assert signal.getsignal(signal.SIGINT) is before
     outer, inner = Workers(1), Workers(1)
     outer.__enter__()
