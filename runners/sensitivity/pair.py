@@ -20,8 +20,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...codegen.sweep.gauss_legendre import STAGES
 from ...model.equations.vehicle_tables import is_mean, mean_source
-from ..solvers.collocation_grid import STAGES, tables_at
+from ..solvers.collocation_grid import tables_at
 from ..solvers.flight_nodes import FlightNodes
 from ..solvers.start_functions import start_functions
 from ..solvers.time_nodes import interval_after, interval_before

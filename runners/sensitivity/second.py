@@ -20,10 +20,10 @@ from numpy.typing import NDArray
 
 from ...codegen.nodes.expressions import MATRICES
 from ...codegen.nodes.matrix import NodeMatrix
+from ...codegen.sweep.gauss_legendre import STAGES
 from ...model.equations.vehicle_tables import is_mean, mean_source
 from ...model.errors import ParameterValueError, SwitchError
 from ..case.provenance import provenance
-from ..solvers.collocation_grid import STAGES
 from ..solvers.stability import warn_if_unstable
 from ..solvers.start_functions import start_functions
 from .gradient import gradient_of

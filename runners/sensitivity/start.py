@@ -14,11 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...codegen.nodes.matrix import NodeMatrix
+from ...codegen.sweep.gauss_legendre import STAGES
 from ...model.system.names import WIND
 from ...model.vehicle.vehicle import Vehicle
 from ...model.wind.shaping_filter import ShapingFilter, entry_name
 from ..solvers.collocation import Collocation
-from ..solvers.collocation_grid import STAGES, Grid
+from ..solvers.collocation_grid import Grid
 from .pair import AdjointPair
 
 RATE = 0.3  # longest step times the filter's rates

@@ -16,20 +16,14 @@ from scipy.linalg import get_lapack_funcs
 
 from ...codegen.nodes.elimination import elimination_plan
 from ...codegen.nodes.matrix import NodeMatrix
+from ...codegen.sweep.gauss_legendre import FROM_STAGES, STAGES, TABLEAU, WEIGHTS
 from ...codegen.toolchain.library import Library
 from ...model.errors import IntegrationError
-from .collocation_grid import NODES, STAGES, WEIGHTS, Grid
+from .collocation_grid import Grid
 
 log = logging.getLogger(__name__)
 
 _factorise, _solve = get_lapack_funcs(("getrf", "getrs"), dtype=np.float64)
-# a, the integrals of the Lagrange polynomials of the nodes from 0 to each node
-TABLEAU = np.linalg.solve(
-    np.vander(NODES, STAGES, increasing=True).T,
-    (NODES[:, None] ** np.arange(1, STAGES + 1) / np.arange(1, STAGES + 1)).T,
-).T
-# d, with which the states at the stages give that at the end of a step, x + d (X - x)
-FROM_STAGES = np.linalg.solve(TABLEAU.T, WEIGHTS)
 
 
 class Collocation:

@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from ...codegen.sweep.gauss_legendre import NODES, WEIGHTS
 from ...codegen.system.executable import ExecutableSystem
 from ...model.tables import TableGroup
 from .time_nodes import intervals, time_nodes
@@ -23,9 +24,6 @@ LEAST = 8  # steps between two ends or discontinuities
 GROWTH = 0.3  # of the step with distance from there, s/s
 
 FINE = 1.3  # spacing of knots, in steps, below which a table is taken as smooth
-STAGES = 4  # of a step, order 8
-_legendre, _weights = np.polynomial.legendre.leggauss(STAGES)
-NODES, WEIGHTS = 0.5 * (1 + _legendre), 0.5 * _weights
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from ...codegen.nodes.compiled import NodeFunctions
 from ...codegen.nodes.matrix import NodeMatrix
+from ...codegen.sweep.gauss_legendre import STAGES
 from ...codegen.system.executable import ExecutableSystem
 from ...model.errors import StepBudgetError
 from .collocation import Collocation, CompiledCollocation, collocation
-from .collocation_grid import STAGES, Grid, StepLengths, collocation_grid, step_lengths, tables_at
+from .collocation_grid import Grid, StepLengths, collocation_grid, step_lengths, tables_at
 from .step_budget import naming_fastest_root
 
 FROZEN = 7  # times at which the roots of A are looked at

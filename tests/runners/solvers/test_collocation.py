@@ -8,10 +8,11 @@ import pytest
 
 from ascentwind.codegen.nodes.compiled import node_functions
 from ascentwind.codegen.nodes.matrix import NodeMatrix
+from ascentwind.codegen.sweep.gauss_legendre import STAGES, TABLEAU
 from ascentwind.model import define_system
 from ascentwind.runners import Cvodes
-from ascentwind.runners.solvers.collocation import TABLEAU, Collocation, CompiledCollocation
-from ascentwind.runners.solvers.collocation_grid import STAGES, Grid
+from ascentwind.runners.solvers.collocation import Collocation, CompiledCollocation
+from ascentwind.runners.solvers.collocation_grid import Grid
 from ascentwind.runners.study import Study
 
 
