@@ -23,6 +23,7 @@ __getattr__, __dir__, __all__ = _lazy.attach(
         "runners.gusts.shapes": ["OneMinusCosine", "QuasiSquare", "RampAndHold"],
         "runners.measured_winds.persistence": ["ComponentPersistence", "Persistence"],
         "runners.parameter_study.run": ["run_parameter_study"],
+        "runners.present.progress": ["show_progress"],
         "runners.statistics.covariance": ["CovarianceEquation"],
         "runners.statistics.cvodes": ["Cvodes"],
         "runners.statistics.ensemble": ["Ensemble"],

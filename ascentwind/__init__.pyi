@@ -16,6 +16,7 @@ from .runners.gusts.shapes import RampAndHold as RampAndHold
 from .runners.measured_winds.persistence import ComponentPersistence as ComponentPersistence
 from .runners.measured_winds.persistence import Persistence as Persistence
 from .runners.parameter_study.run import run_parameter_study as run_parameter_study
+from .runners.present.progress import show_progress as show_progress
 from .runners.statistics.covariance import CovarianceEquation as CovarianceEquation
 from .runners.statistics.cvodes import Cvodes as Cvodes
 from .runners.statistics.ensemble import Ensemble as Ensemble

@@ -35,6 +35,7 @@ from .measured_winds.fly import FlownWinds, fly
 from .measured_winds.met_winds import met_winds
 from .measured_winds.predictor import predict_wind
 from .measured_winds.wind_field import Lasting, measured_persistence, wind_field
+from .present.progress import each, steps
 from .sensitivity.check import check_sensitivity
 from .sensitivity.many import sensitivities
 from .sensitivity.one import sensitivity
@@ -187,19 +188,20 @@ class Study(Case):
             if threads is not None:
                 raise IntegrationError("CVODES computes one set after another; leave 'threads' out, or take the sweep")
             members = []
-            for numbers in values:
+            for numbers in each(values, "sets of parameters"):
                 member = self.mean.fill(self.executable.with_numbers(parameters=numbers))
                 members.append(adjoint_member(member, ends, chosen))
         elif isinstance(chosen, Sweep):
-            found = batch(
-                sweep_of(self.executable),
-                self.executable,
-                values,
-                ends,
-                relative_tolerance=chosen.relative_tolerance,
-                threads=threads,
-                fill=self.mean.fill,
-            )
+            with steps(f"{len(values)} sets of parameters"):
+                found = batch(
+                    sweep_of(self.executable),
+                    self.executable,
+                    values,
+                    ends,
+                    relative_tolerance=chosen.relative_tolerance,
+                    threads=threads,
+                    fill=self.mean.fill,
+                )
             members = [(member.mean, member.variance) for member in found]
         else:
             raise IntegrationError(f"a batch is computed by Sweep or Cvodes, not by {type(chosen).__name__}")

@@ -33,6 +33,7 @@ from ...model.vehicle.vehicle import Vehicle
 from ...model.wind.record import COMPONENTS
 from ...model.wind.statistics import WindModel
 from ..present.notebook import html_page
+from ..present.progress import steps
 from ..solvers.mean_response import Respond, mean_response
 from ..solvers.stability import Root, check_coupling, matrices_at, roots
 from ..solvers.sweep import available_sweep, forward_mean
@@ -116,9 +117,11 @@ class Case:
         ------
         SingularCouplingError, CompilerError
         """
-        system = assemble(vehicle, covariance_at(vehicle.wind.shaping_filter, vehicle.start_altitude))
-        executable = executable_system(system, compile)
-        check_coupling(executable)
+        with steps("equations and their code") as line:
+            system = assemble(vehicle, covariance_at(vehicle.wind.shaping_filter, vehicle.start_altitude))
+            line.done(f"code of {system.name}")
+            executable = executable_system(system, compile)
+            check_coupling(executable)
         return cls(executable, vehicle)
 
     @classmethod
@@ -140,7 +143,8 @@ class Case:
         ------
         CompilerError
         """
-        return cls(executable_system(system, compile))
+        with steps(f"code of {system.name}"):
+            return cls(executable_system(system, compile))
 
     @property
     def system(self) -> LinearSystem:

@@ -11,7 +11,7 @@ from rich.table import Table
 from ...model.errors import DataError, ParameterValueError, TimeRangeError
 from ..present.terminal import console, print_table
 from .flight_load import parse_window
-from .job import Job, load_study, steps
+from .job import Job, load_study, on_terminal, steps
 from .soundings import parse_months
 from .terminal import Changes, VehicleArgument, given, number, refuse_unused, results_folder, whole
 
@@ -74,10 +74,10 @@ def availability(
     limits = Limits.read(limit)
     study = load_study(vehicle, changes, ["title", "default_times"] if window is None else ["title"])
     job = Job(out or results_folder(vehicle, "availability"))
-    with steps("months and azimuths") as bar:
+    with on_terminal():
         found = study.availability(
             limits, months=names, azimuths=angles, winds=winds, window=flown, check_hours=check_hours,
-            threshold=threshold, sides=chosen, draws=draws, seed=seed, progress=bar.reached,
+            threshold=threshold, sides=chosen, draws=draws, seed=seed,
         )  # fmt: skip
     job.replace_earlier("availability", study)
     kept = [

@@ -9,7 +9,7 @@ import typer
 from rich.table import Table
 
 from ..present.terminal import Terminal, console, print_table
-from .job import Job, load_study, steps
+from .job import Job, load_study, on_terminal
 from .terminal import Changes, Turbulence, VehicleArgument, results_folder, whole
 
 if TYPE_CHECKING:
@@ -33,7 +33,6 @@ def verify(
     from ..case.times import parse_times, spread_over
     from ..present.style import write_figure
     from ..statistics.agreement import agreement
-    from ..statistics.engines import ENGINES
     from ..statistics.ensemble import Ensemble
     from ..statistics.response_figures import sample_path_figure
 
@@ -43,13 +42,13 @@ def verify(
     end_times = parse_times(times) if times else spread_over(parse_times(flown.file.default_times), 4)
     study.checked_times(end_times)
     job = Job(out) if out else None
-    with steps("every engine", (len(ENGINES) - 1) * len(end_times) + 1) as bar:  # simulated flights are of all at once
-        found = agreement(study, end_times, ensemble, lambda t: bar.done(f"every engine, {t:g} s"))
+    with on_terminal():
+        found = agreement(study, end_times, ensemble)
     _print_agreement(found)
     if found.resultants is not None:
         _print_resultants(found.resultants)
     if job:
-        with console.status("drawing sample paths"):
+        with on_terminal():
             start, last = study.system.start, max(end_times)
             at = [start + (last - start) * k / 60 for k in range(1, 61)]
             title = f"{study.system.name}: simulated flights and the adjoint's mean ± 3σ"
@@ -139,9 +138,9 @@ def tolerance(
     study.checked_times(end_times)
     named = times or f"{end_times[0]:g}"
     job = Job(out or results_folder(vehicle, "tolerance"))
-    with steps("tolerances", len(TOLERANCES)) as bar:
-        measured = measure(study, end_times, progress=lambda _: bar.done())
-    paces = pacing(study, max(end_times))
+    with on_terminal():
+        measured = measure(study, end_times)
+        paces = pacing(study, max(end_times))
     table = Table("engine", title=f"Largest relative error of a σ, and run time, end times {named} s")
     for value in TOLERANCES:
         table.add_column(f"{value:.0e}", justify="right")

@@ -10,7 +10,7 @@ import typer
 from ...model.errors import UnusedOptionError
 from ..present.terminal import console
 from .flight_load import parse_window
-from .job import Job, load_study
+from .job import Job, load_study, on_terminal
 from .terminal import Changes, VehicleArgument, given, number, refuse_unused, results_folder, whole
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ def day_of_launch(
     study = load_study(vehicle, changes, ["title", "default_times"] if window is None else ["title"])
     persistence = _persistence(study, pairs, component, lasts, exponent if given(context, "exponent") else 2.0 / 3.0)
     job = Job(out or results_folder(vehicle, "day-of-launch"))
-    with console.status("what the balloons say"):
+    with on_terminal():
         asked = study.day_of_launch(
             list(sounding), list(hours_before), limits=limits, window=flown, persistence=persistence, error=error,
             threshold=threshold, sides=chosen, draws=draws, seed=seed, component=component, sign=sign,

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from ..present.terminal import console
-from .job import Job, checked_changes, steps
+from .job import Job, checked_changes, on_terminal, steps
 from .terminal import Changes, refuse_unused
 
 
@@ -29,28 +29,23 @@ def design(
 
     file = find_design(task)
     wanted = checked_changes(changes, ["title"])
-    with console.status("loading and preparing code"):
+    with steps("loading"):
         loaded = load_design(file, wanted)
     if loaded.trade is None:
         refuse_unused(context, ["trades"], f"with {file}, which has no [trade]")
     job = Job(out or Path(f"{loaded.problem.study.system.name}-design"))
-    with console.status("designing") as status:
-        found = run_design(loaded.problem, progress=lambda peak: status.update(f"designing, peak now {peak:.4g}"))
-        status.update("recomputing peaks by CVODES")
+    with on_terminal():
+        found = run_design(loaded.problem)
         recomputed = recompute_peaks(found)
     print_design(found, recomputed, console)
     job.replace_earlier("design", loaded.problem.study)
     job.written += write_design(found, job.folder)
     if trades and loaded.trade is not None:
         points = {}
-        with steps("trade", len(loaded.variants) * len(loaded.trade.limits)) as bar:
+        with steps("variants", len(loaded.variants)) as bar:
             for name, problem in loaded.variants.items():
-                points[name] = trade(
-                    problem,
-                    loaded.trade.response,
-                    loaded.trade.limits,
-                    lambda _, name=name: bar.done(f"trade, {name}"),
-                )
+                points[name] = trade(problem, loaded.trade.response, loaded.trade.limits)
+                bar.done(name)
         job.written += write_trade(points, loaded.trade.response, loaded.title, job.folder)
     job.end()
     if not good(found, recomputed):

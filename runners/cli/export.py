@@ -8,8 +8,7 @@ from typing import Annotated
 import typer
 
 from ...model.errors import UnknownNameError
-from ..present.terminal import console
-from .job import Job, load_study
+from .job import Job, load_study, on_terminal, steps
 from .terminal import Changes, Turbulence, VehicleArgument, results_folder
 
 C = "c"
@@ -42,12 +41,12 @@ def export(
     study = load_study(vehicle, changes, shown, turbulence=turbulence)
     job = Job(out or results_folder(vehicle, format))
     if format == C:
-        with console.status("statistics, and the sources of the library"):
+        with steps("statistics, and the sources of the library"):
             texts = c_library(study, chosen)
         job.replace_earlier("export", study)
         job.written += write_texts(texts, job.folder)
     else:
-        with console.status("matrices"):
+        with on_terminal():
             grid = study.matrix_grid(chosen)
         job.replace_earlier("export", study)
         job.written += write_matrices(grid, format, job.folder, study.system.name)

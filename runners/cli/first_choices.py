@@ -18,7 +18,7 @@ from ...model.files.toml_file import read_toml
 from ...model.vehicle.reader import VEHICLE_FILE
 from ...model.vehicle.vehicle_file import read_vehicle_file
 from ...model.wind.range_reference import PERIODS
-from ..present.terminal import console
+from .job import on_terminal
 
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 TOP = 30000.0  # m, of the shipped winds
@@ -129,7 +129,7 @@ def put_in_place(choices: Choices, folder: Path) -> list[str]:
         from ..construct.build_vehicle import build_vehicle
 
         try:
-            with console.status("building the tables for the new flight"):
+            with on_terminal():
                 build_vehicle(folder)
             said.append("tables built anew for this flight")
         except (DataError, IntegrationError, ModeError) as error:
@@ -161,7 +161,7 @@ def _blow(choices: Choices, folder: Path, azimuth: float | None) -> list[str]:
     if entry.azimuth_deg is not None:
         text = toml.read_text(encoding="utf-8")
         toml.write_text(_in_section(text, "wind", {"azimuth_deg": f"{azimuth:.9g}"}), encoding="utf-8")
-    with console.status("fitting the wind"):
+    with on_terminal():
         s = shipped_statistics(month, record.component, edition=record.edition, top=TOP)
         command = f"ascentwind wind apply --component {record.component} --azimuth {azimuth:.9g} {sign}"
         apply_wind(folder, s, across, record.sign, command)

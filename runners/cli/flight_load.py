@@ -112,7 +112,7 @@ def flight_load(
             bar.done(words(name))
     passage = None
     if limits is not None and (over_time is None or len(over_time.values) > 1):
-        with console.status("limits together"):
+        with steps("limits together"):
             passage = study.limit_passage(limits, flown, asked[0], sides=chosen, draws=2 * draws, seed=seed)
             _ = passage.probability, passage.factor
     job.replace_earlier("flight-load", study)

@@ -9,7 +9,7 @@ import typer
 from rich.table import Table
 
 from ..present.terminal import console, print_table
-from .job import Job, load_study
+from .job import Job, load_study, on_terminal
 from .soundings import parse_levels
 from .terminal import Changes, VehicleArgument, refuse_unused, results_folder, whole
 
@@ -55,7 +55,7 @@ def fly(
     study = load_study(vehicle, changes, ["title", "default_times"] if times is None else ["title"])
     names = study.checked_responses(response or None)
     job = Job(out or results_folder(vehicle, "flown"))
-    with console.status("flying"):
+    with on_terminal():
         flown = study.fly(read, ends, responses=names, component=component, sign=sign)
         _ = flown.predicted_maxima
     job.replace_earlier("fly", study)

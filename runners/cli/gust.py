@@ -72,10 +72,12 @@ def gust(
             bar.done(words(sweep.gust.name))
     job.replace_earlier("gust", study)
     job.written += write_gusts(sweeps, sheets, job.folder)
-    with console.status("figures"):
-        for name in (n for n in sweeps[0].responses if any(sweep.worst(n).value for sweep in sweeps)):
+    drawn = [name for name in sweeps[0].responses if any(sweep.worst(name).value for sweep in sweeps)]
+    with steps("figures", len(drawn)) as bar:
+        for name in drawn:
             over_time = [sweep.over_time(name) for sweep in sweeps]
             job.written += write_figure(gust_figure(sweeps, over_time, name, known.title), job.folder, f"gust_{name}")
+            bar.done()
         both = sweeps[0].from_any_direction
         along = {f"resultant_{load}": load for load in LATERAL} if both else {load: load for load in known_loads(known)}
         for name, load in ((name, load) for name, load in along.items() if name in sweeps[0].responses):

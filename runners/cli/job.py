@@ -9,10 +9,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rich.progress import Progress
-
 from ...model.errors import UnknownNameError, UnusedOptionError
-from ..present.terminal import console, machine_reads, progress_bar, warned
+from ..present.progress import Steps, opened
+from ..present.progress import steps as own_steps
+from ..present.terminal import console, machine_reads, warned
 from .terminal import parse_changes
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ def load_study(
     wanted = checked_changes(changes, shows)
     if turbulence is not None:
         wanted |= _with_turbulence(turbulence, wanted)
-    with console.status("loading and preparing code"):
+    with steps("loading"):
         from ..study import Study
 
         return Study.load(vehicle, changes=wanted)
@@ -78,28 +78,20 @@ def _with_turbulence(typed: str, changes: Mapping[str, Any]) -> dict[str, Any]:
     return {KEY: typed}
 
 
-class Steps:
-    """A bar on the terminal, of which one step after another is done."""
+@contextmanager
+def on_terminal() -> Iterator[None]:
+    """Show on the terminal what the library says of its progress."""
+    from ..present.bars import terminal_bar
 
-    def __init__(self, bar: Progress, text: str, total: int | None):
-        self.bar, self.task = bar, bar.add_task(text, total=total)
-
-    def done(self, text: str | None = None) -> None:
-        """Advance by one step; ``text`` says what is being done now."""
-        if text is not None:
-            self.bar.update(self.task, description=text)
-        self.bar.advance(self.task)
-
-    def reached(self, count: int, total: int) -> None:
-        """Advance to a number of steps, of a total that may not have been known before."""
-        self.bar.update(self.task, completed=count, total=total)
+    with opened(terminal_bar(console)):
+        yield
 
 
 @contextmanager
-def steps(text: str, total: int | None = None) -> Iterator[Steps]:
-    """Show a bar while something is computed step by step."""
-    with progress_bar() as bar:
-        yield Steps(bar, text, total)
+def steps(text: str, total: float | None = None) -> Iterator[Steps]:
+    """Show a bar on the terminal while something is computed, with what the library says of it."""
+    with on_terminal(), own_steps(text, total) as line:
+        yield line
 
 
 class Job:

@@ -9,7 +9,7 @@ import typer
 from rich.table import Table
 
 from ..present.terminal import console, print_whole
-from .job import Job, load_study
+from .job import Job, load_study, on_terminal
 from .terminal import Changes, VehicleArgument
 
 
@@ -26,7 +26,7 @@ def mean(
 
     study = load_study(vehicle, changes)
     job = Job(out) if out else None
-    with console.status("flying through the mean wind"):
+    with on_terminal():
         found = mean_comparison(study)
     table = Table("response", "linear, peak deg", "at s", "nonlinearity, deg", "at s", "bending and slosh, deg", "at s")
     degrees = found["mean"] * (180 / np.pi)

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from ..present.terminal import console
+from .job import steps
 
 
 def report(
@@ -28,7 +29,7 @@ def write_report(folder: Path, out: Path | None = None) -> Path:
     ------
     ResultsFolderError, DataError, OutputFolderError
     """
-    with console.status("writing the report"):
+    with steps("writing the report"):
         from ..present.files import prepare_folder, write_text
         from ..present.manifest import PAGE, Manifest
         from ..report.folder import open_folder

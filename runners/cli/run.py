@@ -13,7 +13,7 @@ from ...model.errors import AscentwindError, OutputFolderError, UnusedOptionErro
 from ..present.terminal import complain, console, print_table
 from ..statistics.larger_side import LARGER_SIDE
 from .flight_load import known_loads, print_levels
-from .job import SHOWN, Job, load_study, steps
+from .job import SHOWN, Job, load_study, on_terminal, steps
 from .report import write_report
 from .system import run_system
 from .terminal import Changes, OptionalVehicle, Turbulence, number, parse_changes, results_folder
@@ -124,10 +124,8 @@ def run(
     if turns:
         check_turns(study)
     job = Job(out or results_folder(vehicle, "results"))
-    with steps("end times", len(end_times)) as bar:
-        statistics = study.response_statistics(
-            end_times, engine=chosen, progress=lambda t: bar.done(f"end time {t:g} s")
-        )
+    with on_terminal():
+        statistics = study.response_statistics(end_times, engine=chosen)
     if chances:
         statistics = statistics.with_percentiles(chances)
     both = statistics.resultants((LIKE_3_SIGMA, *chances)) if has_resultants(statistics.dataset) else None
@@ -138,7 +136,7 @@ def run(
     own = trajectory_angle(flown, end_times) if flown.file.planes != "yaw" else None
     if own is not None:
         job.written.append(write_text(job.folder / "trajectory_angle_of_attack.csv", trajectory_angle_csv(own)))
-    with console.status("peaks again by another road"):
+    with on_terminal():
         check = _check_peaks(study, statistics)
     if check is not None:
         statistics = with_peak_check(statistics, check, study)
@@ -146,7 +144,7 @@ def run(
         families = sorted({*families, *(p.time for p in check.peaks[:1] if p.time > study.system.start)})
     both_check = None
     if both is not None:
-        with console.status("resultants again by another road"):
+        with on_terminal():
             both_check = _check_resultants(study, both)
         if both_check is not None:
             statistics = with_resultant_check(statistics, both_check)
@@ -176,10 +174,10 @@ def run(
         bar.done()
     along: list[LargestAlong] = []
     if turns:
-        with console.status("azimuths"):
+        with on_terminal():
             job.written += _write_azimuths(study, turns, end_times, flown.title, job.folder)
     if along_vehicle is not None:
-        with console.status("loads along the vehicle"):
+        with steps("loads along the vehicle"):
             if flown.file.planes == BOTH:
                 job.written += write_resultants_along(study, end_times, moment_time, job.folder)
             else:
@@ -269,7 +267,7 @@ def _check_delays(study: Study, check: PeakCheck) -> tuple[str, bool]:
     from ..statistics.exact_penetration import verdict
 
     try:
-        with console.status("gusts with exact delays"):
+        with on_terminal():
             return verdict(study.check_gust_penetration(check.peaks[0].time))
     except AscentwindError as error:
         return f"The delays of gusts along the vehicle stand unchecked: {error}", False

@@ -9,7 +9,7 @@ import typer
 
 from ..present.terminal import console
 from ..statistics.larger_side import LARGER_SIDE
-from .job import Job, load_study
+from .job import Job, load_study, on_terminal
 from .terminal import Changes, Turbulence, VehicleArgument, number, refuse_unused, results_folder
 
 
@@ -59,7 +59,7 @@ def sensitivity(
     if at != "peak":
         study.checked_times([at])
     job = Job(out or results_folder(vehicle, "sensitivity"))
-    with console.status("finding the peak and differentiating" if at == "peak" else "differentiating"):
+    with on_terminal():
         if of_two:
             found = study.percentile_sensitivity(name, at, chance)
         else:

@@ -9,7 +9,7 @@ import typer
 
 from ..present.terminal import console, errors
 from .exit_codes import INTERRUPTED
-from .job import Job, load_study, steps
+from .job import Job, load_study, on_terminal, steps
 from .terminal import Changes
 
 
@@ -34,17 +34,16 @@ def study(
     loaded = load_study(plan.named_vehicle(), changes, () if plan.times else ("default_times",))
     started = False
     try:
-        with steps("members") as bar:
+        with on_terminal():
 
             def advance(count: int, total: int) -> None:
                 nonlocal started
                 if not started and count:
                     console.print(f"{count} of {total} members were stored in {folder} before", style="dim")
                 started = True
-                bar.reached(count, total)
 
             result = run_parameter_study(file, folder, study=loaded, scheduler=scheduler, progress=advance)
-        with console.status("first-order prediction and figures"):
+        with steps("first-order prediction and figures"):
             job = Job(folder)
             job.replace_earlier("study", loaded)
             job.written += [folder / "study.nc", *report(result, folder, console)]

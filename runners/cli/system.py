@@ -10,7 +10,7 @@ from rich.table import Table
 
 from ...model.errors import UnusedOptionError
 from ..present.terminal import console, print_table
-from .job import Job, steps
+from .job import Job, on_terminal, steps
 from .terminal import results_folder
 
 if TYPE_CHECKING:
@@ -57,15 +57,15 @@ def run_system(
         if value:
             raise UnusedOptionError(f"{option} is of a vehicle and not used with --system; leave it out")
     said = read_toml(file, SystemFile)
-    with console.status("loading and preparing code"):
+    with steps("loading"):
         study = Study.from_system(system_of(said, file))
     asked = times or said.default_times
     start, end = study.system.start, study.system.end
     ends = parse_times(asked) if asked else [start + (end - start) * k / TIMES for k in range(1, TIMES + 1)]
     study.checked_times(ends)
     job = Job(out or results_folder(study.system.name, "results"))
-    with steps("end times", len(ends)) as bar:
-        statistics = study.response_statistics(ends, engine=engine, progress=lambda t: bar.done(f"end time {t:g} s"))
+    with on_terminal():
+        statistics = study.response_statistics(ends, engine=engine)
     if chances:
         statistics = statistics.with_percentiles(chances)
     job.replace_earlier("run", study)

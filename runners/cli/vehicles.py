@@ -11,7 +11,7 @@ from rich.table import Table
 from ...model.errors import OutputFolderError
 from ...model.vehicle.shipped import built_in_vehicles
 from ..present.terminal import console, print_table
-from .job import Job, print_files, steps
+from .job import Job, on_terminal, print_files, steps
 from .terminal import number
 
 
@@ -61,7 +61,7 @@ def import_structure(
     """Masses, stiffness and bending modes from NASTRAN or a spreadsheet, as tables of a construction."""
     from ..construct.sources.import_structure import import_structure as import_tables
 
-    with console.status("reading"):
+    with steps("reading"):
         written, checks = import_tables(source, out)
     for sentence in checks:
         console.print(sentence, soft_wrap=True, markup=False)
@@ -81,7 +81,6 @@ def build_vehicle(
     """The tables of a vehicle from masses, tanks, stiffness, aerodynamics, engines and programme; with figures."""
     from ..construct.build_vehicle import build_vehicle as build
     from ..construct.vehicle_figures import FIGURES
-    from ..construct.vehicle_numbers import STEPS
     from ..present.style import write_figure
 
     shipped = built_in_vehicles()
@@ -91,11 +90,10 @@ def build_vehicle(
             f"({shipped[vehicle]}) to replace its tables"
         )
     folder = Path(vehicle) if Path(vehicle).is_dir() or vehicle not in shipped else shipped[vehicle]
-    with steps(STEPS[0], len(STEPS) + len(FIGURES) + 1) as bar:
-        following: dict[str, str] = dict(zip(STEPS, (*STEPS[1:], "tables"), strict=True))
-        numbers, written = build(folder, out, spacing=spacing, progress=lambda step: bar.done(following[step]))
-        bar.done("figures")
-        job = Job(figures or (out or folder) / "figures")
+    with on_terminal():
+        numbers, written = build(folder, out, spacing=spacing)
+    job = Job(figures or (out or folder) / "figures")
+    with steps("figures", len(FIGURES)) as bar:
         for name, draw in FIGURES.items():
             job.written += write_figure(draw(numbers), job.folder, name)
             bar.done()

@@ -12,7 +12,7 @@ from rich.table import Table
 from ...model.errors import DataError, OutputFolderError
 from ..present.terminal import console, print_table
 from .availability import months
-from .job import Job, load_study, steps
+from .job import Job, load_study, on_terminal, steps
 from .soundings import read
 from .terminal import Changes, VehicleArgument, given, number, refuse_unused, whole
 
@@ -125,9 +125,7 @@ def apply(
     """Give a vehicle a wind: filter, mean, standard deviation and record together."""
     from ...model.errors import UnknownNameError
     from ...model.vehicle.shipped import built_in_vehicles
-    from ..solvers.least_squares import FitOptions
     from ..wind.apply import apply_wind, flight_azimuth
-    from ..wind.fitting.progress import fit_progress
 
     folder = Path(vehicle)
     if not folder.is_dir() and vehicle in built_in_vehicles():
@@ -167,9 +165,8 @@ def apply(
     command = (
         f"ascentwind wind apply --component {component} --azimuth {math.degrees(across):.9g} --sign {sign} {where}"
     )
-    limit = FitOptions().time_limit
-    with fit_progress(console, f"filter for {s.name}", limit) as progress:
-        applied = apply_wind(folder, s, across, sign, command, FitOptions(progress=progress))
+    with on_terminal():
+        applied = apply_wind(folder, s, across, sign, command)
     share = applied.record.share_across
     for line in (
         f"{s.name}: filter within {applied.fit.rms_error:.3g} m²/s² rms",
@@ -194,13 +191,11 @@ def _where(
 
 
 def _apply_both(folder: Path, azimuth: float, s: TwoComponentStatistics, where: str) -> None:
-    from ..solvers.least_squares import FitOptions
     from ..wind.apply import apply_components
-    from ..wind.fitting.progress import fit_progress
 
     command = f"ascentwind wind apply --components both --azimuth {math.degrees(azimuth):.9g} {where}"
-    with fit_progress(console, "filters of both components", FitOptions().time_limit) as progress:
-        applied = apply_components(folder, s, azimuth, command, FitOptions(progress=progress))
+    with on_terminal():
+        applied = apply_components(folder, s, azimuth, command)
     zonal, meridional = (fit.rms_error for fit in applied.fits)
     for line in (
         f"filters within {zonal:.3g} (zonal) and {meridional:.3g} m²/s² rms (meridional), the correlation of the two "
@@ -324,7 +319,6 @@ def fit(
     from ...model.wind.filter_file import filter_text
     from ..present.files import prepare_folder, write_text
     from ..solvers.least_squares import FitOptions
-    from ..wind.fitting.progress import fit_progress
     from ..wind.synthesis.result import SynthesisError
     from ..wind.synthesis.synthesise import synthesise
 
@@ -335,8 +329,8 @@ def fit(
     settings = {"noises": noises} if noises != 1 else {}
     prepare_folder(out.parent)
     s = _statistics(context, period, component, edition, top, soundings)
-    with fit_progress(console, f"{method} for {s.name}", time_limit) as progress:
-        result = synthesise(s, method, order, FitOptions(time_limit=time_limit, progress=progress), **settings)
+    with on_terminal():
+        result = synthesise(s, method, order, FitOptions(time_limit=time_limit), **settings)
     made = result.shaping_filter
     command = f"ascentwind wind fit --method {method} --order {made.order} --noises {made.noise_count}" + (
         f" --period {period} --component {component} --edition {edition} --top {top:g}"
@@ -372,8 +366,10 @@ def check(
 
     shaping_filter = read_filter(filter_file)
     s = _statistics_of(context, shaping_filter, period, component, edition, top, soundings)
-    v = verify(shaping_filter, s)
-    share = ensemble_share_inside(shaping_filter, v.covariance, s.altitude, profiles)
+    with steps("the filter against its data", 2) as bar:
+        v = verify(shaping_filter, s)
+        bar.done(f"{profiles} profiles")
+        share = ensemble_share_inside(shaping_filter, v.covariance, s.altitude, profiles)
     table = Table("what", "found", title=f"{shaping_filter.name} against {s.name}")
     table.add_row("rms error of the covariances", f"{v.rms_error:.3g} m²/s²")
     table.add_row("inside the 90 % interval of the data", f"{100 * v.share_inside:.1f} %")
@@ -439,9 +435,7 @@ def compare(
     from ...model.wind.range_reference import shipped_statistics
     from ..case.times import time_of_greatest_dynamic_pressure
     from ..present.style import display, words
-    from ..solvers.least_squares import FitOptions
     from ..views.wind_comparison import (
-        CASES,
         REPORT_ERRORS,
         TOP,
         compare_winds,
@@ -449,22 +443,20 @@ def compare(
         shipped_winds,
         stretched_to_error,
     )
-    from ..wind.fitting.progress import fit_progress
 
     study = load_study(vehicle, changes)
     flown = study.vehicle_for("a comparison of winds")
     record = recorded_wind(flown)
     component = record.origin.component
     time = time_of_greatest_dynamic_pressure(flown) if time is None else time
-    limit = FitOptions().time_limit
-    with fit_progress(console, "fitting filters", limit * len(CASES)) as fitting:
-        winds = shipped_winds(component, record.sign, FitOptions(progress=fitting))
+    with on_terminal():
+        winds = shipped_winds(component, record.sign)
         march, fitted = shipped_statistics(component=component, top=TOP), winds["march, fitted"]
         for rms in REPORT_ERRORS:
             poorer = stretched_to_error(fitted.shaping_filter, march, rms)
             winds[f"march, wrong by {rms:.0f} m²/s² rms"] = replace(fitted, shaping_filter=poorer)
-    with steps("responses", len(winds) + 1) as bar:
-        found = compare_winds(study, winds, time, response, progress=bar.done)
+    with on_terminal():
+        found = compare_winds(study, winds, time, response)
     factor, unit = display(found[0].unit, [c.deviation for c in found])
     table = Table(
         title=f"{words(response).capitalize()} at {time:g} s, {component} wind alone",

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...model.construction import Construction
+from ..present.progress import steps
 from . import aerodynamics
 from .ascent.mean_flight import MeanFlight, fly
 from .beam.given import given_modes
@@ -89,7 +90,17 @@ def compute_vehicle(
     ------
     DataError, ModeError, IntegrationError
     """
-    done = progress or (lambda step: None)
+    with steps(STEPS[0], len(STEPS)) as line:
+
+        def done(step: str) -> None:
+            line.done((*STEPS, "tables")[STEPS.index(step) + 1])
+            if progress:
+                progress(step)
+
+        return _computed(construction, spacing, done)
+
+
+def _computed(construction: Construction, spacing: float, done: Progress) -> VehicleNumbers:
     flight = fly(construction, spacing)
     done(STEPS[0])
     properties = mass_properties(construction, flight.liquid)

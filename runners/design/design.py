@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ...model.deprecation import warn_deprecated
 from ...model.errors import UnknownNameError
 from ..present.notebook import html_of
+from ..present.progress import each, steps
 from ..solvers.adjoint import AdjointSolver
 from ..solvers.integration import CvodesSettings
 from ..statistics.larger_side import larger_side, side
@@ -155,17 +156,20 @@ def design(
     began = time.monotonic()
     search = Search(problem)
     u = problem.start if start is None else _position(problem, start)
-    history = [_history(search, u)]
+    unit = labels_of(problem.study, problem.response)[0].unit
+    with steps("looking for a lower peak") as line:
+        history = [_history(search, u)]
 
-    def heard(at: NDArray[np.float64]) -> None:
-        history.append(_history(search, at))
-        progress(history[-1][0])
+        def heard(at: NDArray[np.float64]) -> None:
+            history.append(_history(search, at))
+            line.reached(len(history), text=f"iteration {len(history)}, peak now {history[-1][0]:.4g} {unit}")
+            progress(history[-1][0])
 
-    if search.violation(u) > ACTIVE:
-        u = search.find_feasible(u)
-    if search.violation(u) > ACTIVE:
-        raise _infeasible(search, u)
-    u = search.descend(u, heard)
+        if search.violation(u) > ACTIVE:
+            u = search.find_feasible(u)
+        if search.violation(u) > ACTIVE:
+            raise _infeasible(search, u)
+        u = search.descend(u, heard)
     return DesignResult(
         problem,
         _values(problem, u),
@@ -214,7 +218,7 @@ def recompute_peaks(result: DesignResult, relative_tolerance: float = 1e-11) -> 
     largest = peaks.max(axis=1)
     near = largest >= (1 - CLOSE) * largest.max(axis=1, keepdims=True)
     found = []
-    for k in np.flatnonzero(near.any(axis=0)):
+    for k in each(np.flatnonzero(near.any(axis=0)), "peaks again by CVODES"):
         run = solver.run(problem.times[k])
         for r in np.flatnonzero(near[:, k]):
             of = outputs_of(study, responses[r])
@@ -241,7 +245,6 @@ def trade(
     problem: LoadReliefProblem,
     response: str,
     limits: Sequence[float],
-    progress: Callable[[float], None] = lambda _: None,
 ) -> list[TradePoint]:
     """Return designs under a sequence of limits on the peak of a response, the loosest first, each from the last.
 
@@ -251,7 +254,7 @@ def trade(
     """
     points: list[TradePoint] = []
     start: Mapping[str, float] | None = None
-    for limit in sorted(limits, reverse=True):
+    for limit in each(sorted(limits, reverse=True), f"trade against {response}"):
         if points and points[-1].result is None:  # a tighter limit cannot be met either
             points.append(TradePoint(limit, None, points[-1].closest))
             continue
@@ -261,7 +264,6 @@ def trade(
             points.append(TradePoint(limit, found))
         except InfeasibleDesignError as error:
             points.append(TradePoint(limit, None, error.closest))
-        progress(limit)
     return points
 
 

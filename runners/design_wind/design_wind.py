@@ -28,6 +28,7 @@ from ..flight_load.load import FlightLoad
 from ..flight_load.request import NoVarianceError
 from ..gusts.weights import WindWeights, weights_of_rows
 from ..present.notebook import html_of
+from ..present.progress import steps
 from ..solvers.time_nodes import interval_before, time_nodes
 from ..statistics.engines import response_statistics
 from ..statistics.norm import NormOfNormal
@@ -334,6 +335,7 @@ def mean_winds(case: Case, altitude: NDArray[np.float64]) -> NDArray[np.float64]
     return scale * np.stack([m.polynomial(np.clip(altitude, m.argument[0], m.argument[-1])) for m in means], axis=1)
 
 
+@steps("the most likely wind")
 def design_wind(
     case: Case, response: str | FlightLoad, time: float | None, sigmas: float, combined: bool
 ) -> DesignWind:

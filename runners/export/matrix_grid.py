@@ -15,6 +15,7 @@ from ..case.case import Case
 from ..case.provenance import provenance
 from ..case.times import end_times
 from ..present.netcdf import RULE
+from ..present.progress import steps
 from ..solvers.time_nodes import time_nodes
 
 STEP = 0.05  # s
@@ -51,6 +52,7 @@ def default_grid(case: Case, step: float = STEP) -> NDArray[np.float64]:
     return np.linspace(start, end, 1 + max(1, int(np.ceil((end - start) / step - 1e-9))))
 
 
+@steps("matrices")
 def matrix_grid(case: Case, times: Iterable[float]) -> xr.Dataset:
     """Return A, B, C, D, E, G and the known inputs over time.
 

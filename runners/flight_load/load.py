@@ -17,6 +17,7 @@ from ...model.errors import ParameterValueError
 from ..case.case import Case
 from ..case.provenance import provenance, wind_samples
 from ..present.notebook import html_of
+from ..present.progress import steps
 from ..statistics.percentiles import (
     Sides,
     checked_probabilities,
@@ -124,8 +125,12 @@ class FlightLoad:
     @cached_property
     def levels(self) -> tuple[Level, ...]:
         """What is found for every probability: level, interval, estimate, paths."""
-        found = zip(self.processes, self.probabilities, strict=True)
-        return tuple(self._level(process, p, self.draws) for process, p in found)
+        with steps(f"level of {self.response}", len(self.probabilities)) as line:
+            found = []
+            for process, p in zip(self.processes, self.probabilities, strict=True):
+                found.append(self._level(process, p, self.draws))
+                line.done()
+        return tuple(found)
 
     def _level(self, process: Process, probability: float, draws: int) -> Level:
         size = float((np.abs(process.drawn.mean) + process.std).max())
@@ -219,6 +224,7 @@ class FlightLoad:
         name = f"{100 * confidence:g} % interval by {number:g} independent soundings of the wind"
         return self._array(found, name, ("bound",)).assign_attrs(independent_samples=number, confidence=confidence)
 
+    @steps("levels with an uncertain parameter")
     def level_with_uncertain(self, parameter: str = WIND_SIGMA, spread: float | None = None) -> xr.DataArray:
         """Return the levels of flights of which a parameter is uncertain, a constant of each, (probability,).
 
@@ -324,6 +330,7 @@ class FlightLoad:
         """Whether the grid of times is too coarse for the levels."""
         return self.spacing_missed > SPACING_ERROR or self.is_fast
 
+    @steps("chance of passing a level")
     def probability(self, value: float) -> Estimate:
         """Return the probability that the flight's maximum passes a value.
 
@@ -395,6 +402,7 @@ class FlightLoad:
         return self.probabilities.index(probability)
 
     @cached_property
+    @steps("passage of the limit")
     def passage(self) -> Passage:
         """Whether a flight keeps the limit of the response, at the first of the probabilities.
 
@@ -407,6 +415,7 @@ class FlightLoad:
         return Passage(self.of.case, loads, self.process, limit, self.sides, own, self.draws, self.seed)
 
     @cached_property
+    @steps("chances of passing levels")
     def exceedance(self) -> xr.DataArray:
         """Probability of passing each level from about 0.5 down to 1e-7, (level,), with ``standard_error``."""
         begin, end = (self._instant_level(np.log(p)) for p in (0.5, 1e-8))
@@ -436,6 +445,7 @@ class FlightLoad:
         return max(float(side.max()) for name, side in sides.items() if self.sides in (name, "both"))
 
     @cached_property
+    @steps("times of the maximum")
     def time_of_maximum(self) -> xr.DataArray:
         """Probability density of the time of the maximum, s^-1, (given, time).
 
@@ -496,6 +506,7 @@ class FlightLoad:
         """
         return self._movement(which, self._reaching(which, 4, MOVED))
 
+    @steps("derivatives of a level")
     def sensitivity(self, probability: float | None = None, parameters: Iterable[str] | None = None) -> xr.Dataset:
         """Return derivatives of a level by parameters.
 
@@ -523,6 +534,7 @@ class FlightLoad:
         return found.assign_attrs(probability=self.probabilities[which], sides=self.sides)
 
     @cached_property
+    @steps("shares of the sources")
     def shares(self) -> xr.Dataset:
         """What each source adds, over (probability, source).
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ..case.case import Case
 from ..case.provenance import provenance
 from ..present.notebook import html_of
+from ..present.progress import steps
 from ..statistics.percentiles import Sides
 from .crossings import Boundary
 from .norms import Norms, Process
@@ -98,6 +99,7 @@ class Passage:
         return Boundary.around(self.limit, self.sides)
 
     @cached_property
+    @steps("flights that pass a limit")
     def _drawn(self) -> Draws:
         return draw_beyond(self.process, self._boundary, np.random.default_rng([self.seed, 10]), self.draws)
 
@@ -137,6 +139,7 @@ class Passage:
         return self.limit[:: self.process.stride][self.told]
 
     @cached_property
+    @steps("levels of all limits")
     def level(self) -> xr.DataArray:
         """The level that each load passes at each instant with the design probability, (time, load), SI."""
         values = instant_levels(self.process, self.design, self.sides, self.told)
@@ -149,6 +152,7 @@ class Passage:
         return self._over_time(values, "margin", f"limit minus the level passed with probability {self.design:g}")
 
     @cached_property
+    @steps("factor on all limits")
     def factor(self) -> Level:
         """The factor on all limits at which a flight passes one of them with the design probability."""
 

@@ -17,6 +17,7 @@ from ..case.provenance import provenance
 from ..case.times import end_times, parse_times, spread_over
 from ..present.netcdf import RULE
 from ..present.notebook import html_of
+from ..present.progress import each, steps
 from .clocking import Quantities, checked_quantities
 from .response import check_length, described, gust_products, gust_response
 from .shapes import LENGTHS, Gust, GustError, checked_gust
@@ -110,7 +111,9 @@ class GustSweep:
         lengths was found for the earliest start that could be looked at. In both planes gusts blow from any direction:
         ``largest`` is a size, and ``direction`` where that gust blows.
         """
-        found = [self._at(weights, self.responses) for weights in self._weights(self.times, self.responses)]
+        with steps("weights of the wind"):
+            weights_of = self._weights(self.times, self.responses)
+        found = [self._at(weights, self.responses) for weights in each(weights_of, f"{self.gust.name} gusts")]
         largest, starts, edge, directions = (np.array(part) for part in zip(*found, strict=True))
         dims = ("time", "response", "length")
         turned = {"units": "rad", "long_name": "where that gust blows, from north towards east"}
@@ -152,7 +155,7 @@ class GustSweep:
 
     @cached_property
     def _worst(self) -> dict[str, WorstGust]:
-        return {name: self._located(name) for name in self.responses}
+        return {name: self._located(name) for name in each(self.responses, f"worst {self.gust.name} gusts")}
 
     @cached_property
     def longest(self) -> float:

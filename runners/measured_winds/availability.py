@@ -34,6 +34,7 @@ from ..flight_load.passage import Passage
 from ..flight_load.process import joint_covariance
 from ..flight_load.request import checked_draws
 from ..flight_load.window import checked_window, window_chain
+from ..present.progress import each
 from ..solvers.markov_chain import MarkovChain
 from ..solvers.time_nodes import interval_before
 from ..statistics.norm import NormOfNormal
@@ -73,7 +74,6 @@ def availability(
     progress: Callable[[int, int], None] | None = None,
 ) -> xr.Dataset:
     """See :meth:`Study.availability`."""
-    told = progress or (lambda done, total: None)
     checked_draws(draws, seed)
     chosen, flown = checked_sides(sides), checked_window(case, window)
     if not 0 < threshold < 1:
@@ -100,11 +100,13 @@ def availability(
     }
     found |= {key: np.full(shape, np.nan) for key in ("stopped", "remaining_risk")}
     levels_shown = [limit.load for limit in loads.limits]
+    count = len(seasons) * len(turns)
     level = np.full((*shape, len(levels_shown)), np.nan)
-    for i, month in enumerate(seasons):
+    for i, month in each(list(enumerate(seasons)), "months"):
         field = WindField(_wind(month, levels))
-        for j, turn in enumerate(turns):
-            told(i * len(turns) + j, len(seasons) * len(turns))
+        for j, turn in each(list(enumerate(turns)), f"azimuths of {month.period}"):
+            if progress:
+                progress(i * len(turns) + j, count)
             about = _in_mean(case, month, turn)
             chain = window_chain(about, flown, steps)
             row, direct, mean = loads.over(chain, about)
@@ -154,7 +156,8 @@ def availability(
                     field, some, weight[at][:, rows], mean[at][:, rows], covariance[which][:, :, which],
                     some.values(times[at]), chosen, check_hours, threshold, seed,
                 )  # fmt: skip
-    told(len(seasons) * len(turns), len(seasons) * len(turns))
+    if progress:
+        progress(count, count)
     meanings = {
         "probability": "of passing any limit in a flight",
         "lower": "lower end of its 90 % interval, by the statistics' own sampling",

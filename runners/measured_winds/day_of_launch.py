@@ -39,6 +39,7 @@ from ..flight_load.request import checked_draws
 from ..flight_load.window import checked_window, window_chain
 from ..present.netcdf import RULE
 from ..present.notebook import html_of
+from ..present.progress import steps
 from ..statistics.norm import NormOfNormal
 from ..statistics.percentiles import Sides, checked_sides
 from ..statistics.resultants import resultant_pairs
@@ -552,6 +553,7 @@ class DayOfLaunch:
         """
         return self.flight.loads.rows[number_of(response, self.responses)].unit
 
+    @steps("chance of passing limits")
     def _passage(self, given: bool) -> Passage:
         """Return the passage given the measurements, or of the season, on the fine grid where it is worth while."""
         flight, loads = self.flight, self.flight.loads
@@ -597,6 +599,7 @@ def matter(chance: NDArray[np.float64]) -> list[int]:
     return sorted(order[min(left, each.size - 1) :].tolist())
 
 
+@steps("what the balloons say")
 def day_of_launch(
     case: Case,
     soundings: Balloon | Sequence[Balloon],

@@ -23,6 +23,7 @@ from ..case.provenance import provenance
 from ..case.times import end_times, parse_times
 from ..present.netcdf import RULE
 from ..present.notebook import html_of
+from ..present.progress import steps
 from ..solvers.discretisation import symmetric_root
 from ..statistics.engines import response_statistics
 from ..statistics.resultants import resultant_pairs
@@ -306,6 +307,7 @@ class FlownWinds:
         }
 
 
+@steps("flights through measured winds")
 def fly(
     case: Case,
     profiles: str | Path | Soundings | Sounding,

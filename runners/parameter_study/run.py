@@ -20,6 +20,7 @@ from ..case.times import parse_times
 from ..present.files import write_bytes
 from ..present.netcdf import RULE, one_unit_a_variable, with_conventions
 from ..present.notebook import html_of, shortened
+from ..present.progress import steps
 from ..statistics.dataset import QUANTITIES
 from ..statistics.norm import LIKE_3_SIGMA
 from ..statistics.resultants import MEANINGS, labels_of, response_or_resultant, resultant_pairs
@@ -202,7 +203,8 @@ def _complete(
     done = sum(len(result.status) for result in found.values())
     if progress:
         progress(done, members)
-    with closing(_results(study, task, missing, scheduler)) as results:
+    with steps("members") as line, closing(_results(study, task, missing, scheduler)) as results:
+        line.reached(done, members)
         for chunk, result in results:
             try:
                 store.write(chunk, result)
@@ -212,6 +214,7 @@ def _complete(
                 ) from None
             found[chunk.first] = result
             done += len(result.status)
+            line.reached(done)
             if progress:
                 progress(done, members)
     return [found[chunk.first] for chunk in wanted]

@@ -1,4 +1,4 @@
-"""The terminal: consoles, progress, and tables that lose no digit."""
+"""The terminal: consoles, and tables that lose no digit."""
 
 from __future__ import annotations
 
@@ -10,15 +10,6 @@ from typing import Any
 
 from rich.console import Console
 from rich.measure import Measurement
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    SpinnerColumn,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
 from rich.table import Table
 
 
@@ -50,21 +41,6 @@ EDGES = 3  # of a column: a space on either side and a line
 def complain(text: str) -> None:
     """Say what went wrong while all else stands."""
     errors.print(text, style="bold red", markup=False, highlight=False, soft_wrap=True)
-
-
-def progress_bar() -> Progress:
-    """Return a bar that says what is done, how much of it, for how long, and how long it will still take."""
-    return Progress(
-        SpinnerColumn(),
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TextColumn("left", style="dim"),
-        TimeRemainingColumn(),
-        console=console,
-        transient=True,
-    )
 
 
 @dataclass

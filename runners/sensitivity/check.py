@@ -24,6 +24,7 @@ from ...model.vehicle.vehicle import Vehicle
 from ...model.wind.shaping_filter import ShapingFilter
 from ...model.wind.two_components import TwoComponentWind
 from ..case.wind_start import covariance_at
+from ..present.progress import each
 from ..solvers.adjoint import AdjointSolver
 from ..solvers.integration import CvodesSettings
 from ..solvers.mean_response import mean_response, with_mean_tables
@@ -101,9 +102,10 @@ def check_sensitivity(
         pair = request.pair(case, time)
         meeting = {i: far for i, far in gradient_of(pair, *request.factors(pair)).reach.items() if far > 0}
     labels, at, derivatives, differences = [], [], [], []
-    for name, number, derivative in zip(
+    named = zip(
         found["parameter"].values.tolist(), found["parameter_value"].values, found["derivative"].values, strict=True
-    ):
+    )
+    for name, number, derivative in each(list(named), "parameters by differences"):
 
         def of_parameter(x: float, i: int = case.system.parameter_names.index(name)) -> float:
             changed = executable.parameters.copy()
@@ -115,7 +117,7 @@ def check_sensitivity(
         derivatives.append(derivative)
         reach = 0.5 * meeting.get(case.system.parameter_names.index(name), np.inf)
         differences.append(_difference(of_parameter, number, min(reach, STEP * (abs(number) or 1.0)), value))
-    for name, tables, derivative in _grouped_factors(found, parameters):
+    for name, tables, derivative in each(_grouped_factors(found, parameters), "tables by differences"):
 
         def of_factor(x: float, tables: list[str] = tables) -> float:
             groups = tuple(group.scaled(dict.fromkeys(tables, x)) for group in executable.groups)
@@ -125,7 +127,7 @@ def check_sensitivity(
         at.append(1.0)
         derivatives.append(derivative)
         differences.append(_difference(of_factor, 1.0, STEP, value))
-    for k in _largest_rows(found, rows):
+    for k in each(_largest_rows(found, rows), "rows by differences"):
         name, number = str(found["knot_table"].values[k]), float(found["knot_value"].values[k])
         row = int(np.sum(found["knot_table"].values[:k] == name))
 

@@ -13,6 +13,7 @@ from ...codegen.nodes.compiled import node_functions_of
 from ...codegen.toolchain.interruption import Workers
 from ..case.provenance import provenance
 from ..case.times import end_times
+from ..present.progress import each
 from ..solvers.cores import available_cores
 from ..solvers.flight_nodes import FlightNodes
 from ..solvers.stability import warn_if_unstable
@@ -54,7 +55,8 @@ def sensitivities(
         return request.value(pair.variance, pair.mean), gradient.parameters[rows]
 
     with Workers(available_cores()) as pool:
-        found = list(pool.map(one, [(time, request) for time in ends for request in requests]))
+        asked = [(time, request) for time in ends for request in requests]
+        found = list(each(pool.map(one, asked), "sensitivities", len(asked)))
     shape = (len(ends), len(names))
     values = np.array([value for value, _ in found]).reshape(shape)
     derivatives = np.array([derivative for _, derivative in found]).reshape(*shape, len(rows))

@@ -24,6 +24,7 @@ from ...codegen.sweep.gauss_legendre import STAGES
 from ...model.equations.vehicle_tables import is_mean, mean_source
 from ...model.errors import ParameterValueError, SwitchError
 from ..case.provenance import provenance
+from ..present.progress import each
 from ..solvers.stability import warn_if_unstable
 from ..solvers.start_functions import start_functions
 from .gradient import gradient_of
@@ -60,7 +61,7 @@ def second_derivatives(
     refuse_undefined(case.system, gradient, rows)
     combined = pair.combine(*factors)
     moving = [k for k, row in enumerate(rows) if row in gradient.reach]
-    hessian = np.array([_column(pair, combined, factors, row)[rows] for row in rows])
+    hessian = np.array([_column(pair, combined, factors, row)[rows] for row in each(rows, "second derivatives")])
     curvature = request.curvature(pair)
     if curvature:
         of_variance = gradient_of(pair, 1.0, 0.0).parameters[rows]

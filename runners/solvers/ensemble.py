@@ -16,6 +16,7 @@ from scipy.special import chdtri, stdtrit
 from ...codegen.ensemble.compiled import ensemble_of
 from ...codegen.system.executable import ExecutableSystem
 from ...codegen.toolchain.interruption import Workers
+from ..present.progress import each
 from .cores import available_cores
 from .discretisation import discretise
 
@@ -108,7 +109,7 @@ def run_ensemble(
         return compiled.run(found.steps, seed, first, size, keep_paths=first < paths)
 
     with Workers(threads or available_cores()) as pool:
-        results = list(pool.map(chunk, firsts))
+        results = list(each(pool.map(chunk, firsts), f"{runs} flights in lots of {CHUNK}", len(firsts)))
     at = np.searchsorted(grid, times)
     deviations = [flown for _, flown in results if flown is not None]
     kept = np.concatenate(deviations)[:paths] if deviations else np.empty((0, grid.size, len(system.outputs)))

@@ -30,6 +30,7 @@ from ...model.vehicle.vehicle import Vehicle
 from ...model.vehicle.zones import PREFIX as ZONES
 from ..case.case import Case
 from ..case.provenance import provenance
+from ..present.progress import steps
 from ..solvers.time_nodes import interval_before, time_nodes
 from ..statistics.dataset import QUANTITIES
 from ..statistics.engine import Engine
@@ -211,6 +212,7 @@ def every_load_along_vehicle(
     return [_dataset(case, components, vehicle, load, found, slosh_reaction) for load in loads]
 
 
+@steps("resultants along the vehicle")
 def resultant_along_vehicle(
     case: Case,
     times: Iterable[float],

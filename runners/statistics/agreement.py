@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ..present.progress import each
 from ..solvers.ensemble import mean_interval, std_interval
 from .agreement_of_resultants import ResultantAgreement, resultant_agreement
 from .cvodes import Cvodes
-from .engine import Progress, relative_difference
+from .engine import relative_difference
 from .engines import ENGINES, response_statistics
 from .ensemble import Ensemble
 from .results import ResponseStatistics
@@ -128,7 +129,7 @@ class Agreement:
         )
 
 
-def agreement(case: Case, times: list[float], ensemble: Ensemble, progress: Progress | None = None) -> Agreement:
+def agreement(case: Case, times: list[float], ensemble: Ensemble) -> Agreement:
     """Compute the statistics with every engine at a tight setting and compare.
 
     Parameters
@@ -137,15 +138,14 @@ def agreement(case: Case, times: list[float], ensemble: Ensemble, progress: Prog
     times : list of float
         s.
     ensemble : Ensemble
-    progress : callable, optional
 
     Raises
     ------
     TimeRangeError, IntegrationError, EnsembleNeedsCompilerError
     """
     statistics = {}
-    for name, engine in ENGINES.items():
-        statistics[name] = response_statistics(case, times, engine=engine.tight() or ensemble, progress=progress)
+    for name, engine in each(list(ENGINES.items()), "engines"):
+        statistics[name] = response_statistics(case, times, engine=engine.tight() or ensemble)
     reference = statistics[REFERENCE]
     std, mean = reference.std.values, reference.mean.values
     combined = std[..., -1:]

@@ -8,6 +8,7 @@ from typing import ClassVar
 import xarray as xr
 
 from ..case.case import Case
+from ..present.progress import steps
 from ..solvers.covariance import covariance_equation
 from ..solvers.tolerances import check_absolute_part, check_relative_tolerance
 from .dataset import statistics_dataset, with_covariance
@@ -53,9 +54,16 @@ class CovarianceEquation(Engine):
         self, case: Case, times: list[float], responses: list[str], progress: Progress | None = None
     ) -> xr.Dataset:
         rows = [case.system.output_index(name) for name in responses]
-        found = covariance_equation(
-            case.with_means, times, self.relative_tolerance, progress, self.longest_interval, self.absolute_part
-        )
+        with steps("end times by the covariance equation", len(times)) as line:
+
+            def heard(time: float) -> None:
+                line.done()
+                if progress:
+                    progress(time)
+
+            found = covariance_equation(
+                case.with_means, times, self.relative_tolerance, heard, self.longest_interval, self.absolute_part
+            )
         attributes = {"engine": self.name, "relative_tolerance": self.relative_tolerance}
         dataset = statistics_dataset(case, times, responses, found.mean[:, rows], found.variance[:, rows], attributes)
         return with_covariance(dataset, found.covariance, rows)

@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from ..case.case import Case
+from ..present.progress import each
 from ..solvers.adjoint import AdjointRun, AdjointSolver
 from ..solvers.integration import COUNTERS, CvodesSettings
 from ..solvers.time_nodes import time_nodes
@@ -53,7 +54,8 @@ class Cvodes(CvodesSettings, Engine):
     ) -> xr.Dataset:
         solver = AdjointSolver(case.with_means, self)
         runs = []
-        for time, node in zip(times, time_nodes(case.executable, times).tolist(), strict=True):
+        nodes = time_nodes(case.executable, times).tolist()
+        for time, node in each(list(zip(times, nodes, strict=True)), "end times by CVODES"):
             runs.append(replace(solver.run(node), time=time))
             if progress:
                 progress(time)

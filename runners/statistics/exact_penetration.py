@@ -35,6 +35,7 @@ from ..case.case import Case
 from ..case.provenance import provenance
 from ..case.wind_start import covariance_at
 from ..present.netcdf import RULE
+from ..present.progress import steps
 from ..present.style import words
 from ..solvers.adjoint import AdjointHistory, AdjointSolver
 from ..solvers.time_nodes import intervals, time_nodes
@@ -77,6 +78,7 @@ class ZoneWeights:
         return found
 
 
+@steps("gusts with exact delays")
 def check_gust_penetration(case: Case, time: float) -> xr.Dataset:
     """Return sigma of the wind's sources by rational and by exact delays at one time.
 

@@ -15,6 +15,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ..present.netcdf import RULE
+from ..present.progress import steps
 from ..present.style import display, words
 from ..solvers.adjoint import AdjointHistory, AdjointSolver
 from ..solvers.covariance import covariance_equation
@@ -102,6 +103,7 @@ class PeakCheck:
         )
 
 
+@steps("peaks again by another road")
 def check_peaks(case: Case, statistics: ResponseStatistics) -> PeakCheck:
     """Compute the peaks of statistics again by another road.
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ...model.vehicle.planes import PLANES
 from ..case.case import Case
 from ..present.netcdf import RULE
+from ..present.progress import steps
 from ..present.style import display, words
 from ..solvers.adjoint import AdjointSolver
 from .cvodes import Cvodes
@@ -128,6 +129,7 @@ def law_difference(
     return np.max([mean, spread, by_level], axis=0)
 
 
+@steps("resultants again by another road")
 def check_resultants(case: Case, resultants: Resultants, engine: Cvodes | None = None) -> ResultantCheck:
     """Compute mean and covariance of both planes at the peak of every resultant again by CVODES.
 

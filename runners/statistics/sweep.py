@@ -11,6 +11,7 @@ import xarray as xr
 from ...codegen.sweep.compiled import sweep_of
 from ...model.system.names import COMBINED
 from ..case.case import Case
+from ..present.progress import steps
 from ..solvers.sweep import LEAST_TOLERANCE, SweepResult, sweep
 from ..solvers.tolerances import check_relative_tolerance
 from .dataset import statistics_dataset, with_covariance
@@ -48,14 +49,19 @@ class Sweep(Engine):
     def compute(
         self, case: Case, times: list[float], responses: list[str], progress: Progress | None = None
     ) -> xr.Dataset:
-        found = sweep(
-            sweep_of(case.executable),
-            case.with_means,
-            times,
-            relative_tolerance=self.relative_tolerance,
-            longest_interval=self.longest_interval,
-            responses=responses,
-        )
+        with steps("code of the sweep") as line:
+            compiled = sweep_of(case.executable)
+            line.done("mean response")
+            filled = case.with_means
+            line.done("all end times in one sweep")
+            found = sweep(
+                compiled,
+                filled,
+                times,
+                relative_tolerance=self.relative_tolerance,
+                longest_interval=self.longest_interval,
+                responses=responses,
+            )
         if progress:
             for time in times:
                 progress(time)

@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...codegen.system.functions import state_scales
+from ..present.progress import each
 from ..solvers.adjoint import AdjointSolver
 from ..solvers.stability import matrices_at
 from .covariance import CovarianceEquation
 from .cvodes import Cvodes
-from .engine import Progress, relative_difference
+from .engine import relative_difference
 from .engines import response_statistics
 from .sweep import Sweep
 
@@ -80,9 +81,7 @@ def variants() -> dict[str, Cvodes | Sweep]:
     return found | {Sweep.label: Sweep()}
 
 
-def measure(
-    case: Case, times: list[float], tolerances: tuple[float, ...] = TOLERANCES, progress: Progress | None = None
-) -> list[Measurement]:
+def measure(case: Case, times: list[float], tolerances: tuple[float, ...] = TOLERANCES) -> list[Measurement]:
     """Compute the statistics by every engine at every tolerance, against the covariance equation.
 
     Parameters
@@ -91,8 +90,6 @@ def measure(
     times : list of float
         End times, s.
     tolerances : tuple of float
-    progress : callable, optional
-        Called with each tolerance when it is done.
 
     Raises
     ------
@@ -100,7 +97,7 @@ def measure(
     """
     reference = response_statistics(case, times, engine=CovarianceEquation(REFERENCE_TOLERANCE)).std.values
     found = []
-    for tolerance in tolerances:
+    for tolerance in each(tolerances, "tolerances"):
         for label, engine in variants().items():
             finer = replace(engine, relative_tolerance=tolerance)
             start = clock.perf_counter()
@@ -108,8 +105,6 @@ def measure(
             seconds = clock.perf_counter() - start
             error = float(relative_difference(statistics["std"].values, reference).max())
             found.append(Measurement(label, tolerance, error, seconds))
-        if progress:
-            progress(tolerance)
     return found
 
 

@@ -11,6 +11,7 @@ from matplotlib import rc_context
 from ...model.vehicle.planes import require_yaw
 from ..case.case import Case
 from ..case.provenance import provenance
+from ..present.progress import steps
 from ..present.style import STYLE, Figure, words
 from ..solvers.planar_mean import RESPONSES, planar_mean
 
@@ -23,6 +24,7 @@ _LABELS = {
 _COLORS = {"linear": "#444444", "linear_rigid": "#1f6fb4", "nonlinear_rigid": "#c8442c"}
 
 
+@steps("flight through the mean wind")
 def mean_comparison(study: Case) -> xr.Dataset:
     """Return the mean angle of attack, engine angle and attitude over flight time by three models.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,6 +16,7 @@ from ...model.wind.range_reference import interlevel_kernel, shipped_statistics
 from ...model.wind.record import WindRecord
 from ...model.wind.shaping_filter import ShapingFilter
 from ...model.wind.statistics import WindModel, WindStatistics, closed_form_filter
+from ..present.progress import each
 from ..solvers.least_squares import FitOptions
 from ..study import Study
 from ..wind.fitting.altitude_grid import propagated_covariance
@@ -68,19 +69,13 @@ def compare_winds(
     winds: Mapping[str, WindModel],
     time: float,
     response: str = "bending_moment",
-    progress: Callable[[], None] | None = None,
 ) -> list[WindResponse]:
-    """Return a response at an end time (s) under the study's own wind, then each of the others.
-
-    ``progress`` is called after each wind.
-    """
+    """Return a response at an end time (s) under the study's own wind, then each of the others."""
     found = []
-    for name, wind in {VEHICLE: None, **winds}.items():
+    for name, wind in each(list({VEHICLE: None, **winds}.items()), "responses under winds"):
         case = study if wind is None else study.with_wind(wind)
         part = case.response_statistics([time], responses=[response]).sel(response=response, source="wind", time=time)
         found.append(WindResponse(name, float(part["mean"]), float(part["std"]), str(part["unit"].item())))
-        if progress is not None:
-            progress()
     return found
 
 
@@ -95,7 +90,7 @@ def shipped_winds(component: str = "zonal", sign: int = 1, options: FitOptions |
         Of the component along the vehicle's +Y.
     """
     winds = {}
-    for name, (period, edition) in CASES.items():
+    for name, (period, edition) in each(list(CASES.items()), "fitted winds"):
         statistics = shipped_statistics(period, component, edition=edition, top=TOP)
         winds[f"{name}, fitted"] = wind_of(statistics, synthesise(statistics, options=options).shaping_filter, sign)
     if component == "zonal":

@@ -1,37 +1,35 @@
-"""A progress bar for fits: time used of the limit, evaluations and the best cost so far."""
+"""Progress of fits: time left of their limit, evaluations and the best cost so far."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-from ...solvers.least_squares import Progress as Callback
+from ...present.progress import steps
+from ...solvers.least_squares import FitOptions
 
 
 @contextmanager
-def fit_progress(console: Console, label: str, time_limit: float) -> Iterator[Callback]:
-    """Show a bar that fills with the time limit (s) while the block runs; yields the callback for ``FitOptions``.
+def fit_progress(text: str, options: FitOptions | None) -> Iterator[FitOptions]:
+    """Show a line that fills with the time limit while the block runs; yields the options that tell it.
 
-    A fit that starts again from another point counts its evaluations anew; the bar shows their sum and the least cost.
+    Options that tell somebody else are yielded as they are. A fit that starts again from another point counts its
+    evaluations anew; the line shows their sum and the least cost.
     """
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TimeElapsedColumn(),
-        TextColumn(f"of {time_limit:g} s, {{task.fields[evaluations]}} evaluations, cost {{task.fields[cost]}} m⁴/s⁴"),
-    )
+    options = options or FitOptions()
+    if options.progress is not None:
+        yield options
+        return
     begin, done, last, least = time.monotonic(), 0, 0, float("inf")
-    with Progress(*columns, console=console, transient=True) as bar:
-        task = bar.add_task(label, total=time_limit, evaluations=0, cost="-")
+    with steps(text, options.time_limit, limit=True) as line:
 
         def advance(evaluations: int, cost: float) -> None:
             nonlocal done, last, least
             done += evaluations - last if evaluations > last else evaluations
             last, least = evaluations, min(least, cost)
-            bar.update(task, completed=time.monotonic() - begin, evaluations=done, cost=f"{least:.4g}")
+            told = f"{text}, {done} evaluations, cost {least:.4g} m⁴/s⁴"
+            line.reached(min(time.monotonic() - begin, options.time_limit), text=told)
 
-        yield advance
+        yield replace(options, progress=advance)

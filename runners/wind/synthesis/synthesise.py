@@ -11,6 +11,7 @@ from threadpoolctl import threadpool_limits
 from ....model.errors import AscentwindWarning, UnknownNameError
 from ....model.wind.statistics import WindStatistics
 from ...solvers.least_squares import FitOptions, StalledFitWarning
+from ..fitting.progress import fit_progress
 from . import (
     constrained_response as synthesis_constrained_response,
 )
@@ -97,8 +98,11 @@ def synthesise(
             f"a filter of order {order} needs at least {order + 2} altitudes, and {statistics.name} has "
             f"{statistics.altitude.size}; add levels or lower the order"
         )
-    with threadpool_limits(1, user_api="blas"):  # the matrices are small: on all threads a fit takes five times as long
-        result = function(statistics, order, options, **settings)
+    with (
+        fit_progress(f"{method} for {statistics.name}", options) as heard,
+        threadpool_limits(1, user_api="blas"),  # the matrices are small: on all threads a fit takes five times as long
+    ):
+        result = function(statistics, order, heard, **settings)
     result = replace(result, shaping_filter=replace(result.shaping_filter, origin=statistics.origin))
     if not result.converged:
         warnings.warn(
