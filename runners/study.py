@@ -459,7 +459,8 @@ class Study(Case):
             The system has one plane.
         UnknownNameError, TimeRangeError, ParameterValueError, DirectNoiseError, NoCompilerError, IntegrationError
         """
-        return percentile_sensitivity(self, resultant, time, probability, parameters)
+        with steps("sensitivities of a level"):
+            return percentile_sensitivity(self, resultant, time, probability, parameters)
 
     def design_wind(
         self,
@@ -606,7 +607,8 @@ class Study(Case):
         ------
         NoVehicleError, DataError, SoundingError, UnknownNameError, TimeRangeError, DirectNoiseError
         """
-        return fly(self, profiles, times, responses, component, sign)
+        with steps("flights through measured winds"):
+            return fly(self, profiles, times, responses, component, sign)
 
     def matrix_grid(self, times: Iterable[float] | None = None) -> xr.Dataset:
         """Return the matrices A, B, C, D, E, G and the known inputs over time, with names and units.
@@ -715,10 +717,11 @@ class Study(Case):
         -----
         CertainPassageWarning
         """
-        return day_of_launch(
-            self, soundings, hours_before, limits, window, responses, persistence, error, threshold, sides, draws, seed,
-            component, sign,
-        )  # fmt: skip
+        with steps("what the balloons say"):
+            return day_of_launch(
+                self, soundings, hours_before, limits, window, responses, persistence, error, threshold, sides, draws,
+                seed, component, sign,
+            )  # fmt: skip
 
     def availability(
         self,
@@ -870,7 +873,8 @@ class Study(Case):
             Parameters that are zero; their ``elasticity_defined`` is 0.
         """
         self.require_linear_mean("a sensitivity")
-        return sensitivity(self, response, time, source, quantity, parameters, elasticity)
+        with steps("sensitivities"):
+            return sensitivity(self, response, time, source, quantity, parameters, elasticity)
 
     def sensitivities(
         self,

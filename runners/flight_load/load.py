@@ -402,7 +402,6 @@ class FlightLoad:
         return self.probabilities.index(probability)
 
     @cached_property
-    @steps("passage of the limit")
     def passage(self) -> Passage:
         """Whether a flight keeps the limit of the response, at the first of the probabilities.
 

@@ -553,7 +553,6 @@ class DayOfLaunch:
         """
         return self.flight.loads.rows[number_of(response, self.responses)].unit
 
-    @steps("chance of passing limits")
     def _passage(self, given: bool) -> Passage:
         """Return the passage given the measurements, or of the season, on the fine grid where it is worth while."""
         flight, loads = self.flight, self.flight.loads
@@ -563,7 +562,8 @@ class DayOfLaunch:
         chance = loads.chances(of.mean, of.covariance, loads.values(self.times), self.sides)
         begin, end = worth_while(chance)
         loads, _ = loads.only(matter(chance))
-        fine = flight.fine(loads, begin, end)
+        with steps("winds between the times of the grid"):
+            fine = flight.fine(loads, begin, end)
         level_mean, covariance = fine.mean, fine.covariance
         if given:
             by_level = flight.field.waves @ self._seen_now.T  # cov(wind at levels, measurements)
@@ -599,7 +599,6 @@ def matter(chance: NDArray[np.float64]) -> list[int]:
     return sorted(order[min(left, each.size - 1) :].tolist())
 
 
-@steps("what the balloons say")
 def day_of_launch(
     case: Case,
     soundings: Balloon | Sequence[Balloon],

@@ -23,7 +23,6 @@ from ..case.provenance import provenance
 from ..case.times import end_times, parse_times
 from ..present.netcdf import RULE
 from ..present.notebook import html_of
-from ..present.progress import steps
 from ..solvers.discretisation import symmetric_root
 from ..statistics.engines import response_statistics
 from ..statistics.resultants import resultant_pairs
@@ -307,7 +306,6 @@ class FlownWinds:
         }
 
 
-@steps("flights through measured winds")
 def fly(
     case: Case,
     profiles: str | Path | Soundings | Sounding,

@@ -14,7 +14,6 @@ from ...model.system.linear_system import LinearSystem
 from ...model.system.names import COMBINED
 from ..case.provenance import provenance
 from ..present.netcdf import RULE
-from ..present.progress import steps
 from ..solvers.stability import warn_if_unstable
 from .gradient import Gradient, gradient_of
 from .knots import knot_sensitivities
@@ -31,7 +30,6 @@ class UndefinedElasticityWarning(AscentwindWarning):
     """Parameters that are zero have a derivative but no elasticity."""
 
 
-@steps("sensitivities")
 def sensitivity(
     case: Case,
     response: str,

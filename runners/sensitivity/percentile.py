@@ -21,7 +21,6 @@ from ...codegen.nodes.compiled import node_functions_of
 from ...model.errors import PlanesError, TimeRangeError, UnknownNameError
 from ...model.system.names import COMBINED
 from ..case.provenance import provenance
-from ..present.progress import steps
 from ..solvers.flight_nodes import FlightNodes
 from ..solvers.stability import warn_if_unstable
 from ..statistics.engines import response_statistics
@@ -47,7 +46,6 @@ ROUNDS = 6  # of finer end times about a peak, each five times as fine
 ACCURATE = 1e-9  # relative tolerance of mean and covariance, whose derivatives of a percentile are taken
 
 
-@steps("sensitivities of a level")
 def percentile_sensitivity(
     case: Case,
     resultant: str,
