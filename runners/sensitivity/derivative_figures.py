@@ -18,7 +18,7 @@ LABELS = {LARGER_SIDE: LABEL, "std": "σ", "variance": "variance", "mean": "mean
 
 
 def heading(found: xr.Dataset) -> str:
-    """Return what was differentiated, in words: '|mean| + 3σ (mean + 3σ) bending moment at 74.7 s: 24.7 MN m'."""
+    """Return what was differentiated, in words: '|mean| + 3σ (mean + 3σ) of bending moment at 74.7 s: 24.7 MN m'."""
     a = found.attrs
     factor, unit = display(a["response_unit"], a["value"])
     if "probability" in a:
@@ -26,7 +26,7 @@ def heading(found: xr.Dataset) -> str:
         return f"the level of {words(a['response'])} {chance}: {factor * a['value']:.4g} {unit}"
     source = "" if a["source"] == COMBINED else f" from {words(a['source'])} alone"
     label = LABELS[a["quantity"]] + (f" ({side(a['mean'])})" if a["quantity"] == LARGER_SIDE else "")
-    what = f"{label} {words(a['response'])}{source} at {a['t2_s']:.4g} s"
+    what = f"{label} of {words(a['response'])}{source} at {a['t2_s']:.4g} s"
     if a["quantity"] == "variance":
         return what
     return f"{what}: {factor * a['value']:.4g} {unit}"

@@ -81,7 +81,8 @@ def resultants_along_figure(found: xr.Dataset, time: float, title: str) -> Figur
         size = np.linalg.norm(mean, axis=1)
         axes.plot(station, factor * size, color=COLORS["mean"], lw=1.4, label="resultant of the means")
         axes.set_ylim(bottom=0)
-        what = f"passed with {found.attrs['probability']:.3g} ({unit})"
-        axes.set(xlabel="vehicle station (m)", ylabel=what, title=wrapped(title))
+        what = f"resultant {words(found.attrs['load'])} ({unit})"
+        told = f"{title}\nlevel passed with {found.attrs['probability']:.3g} at an instant"
+        axes.set(xlabel="vehicle station (m)", ylabel=what, title=wrapped(told))
         axes.legend()
     return figure

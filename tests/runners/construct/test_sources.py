@@ -240,7 +240,7 @@ def given():
     [
         (
             lambda m: {"generalized_mass": 2 * m.generalized_mass},
-            r"mode 1 at 0 s has a generalised mass of .* masses give",
+            r"mode [12] at 0 s has a generalised mass of .* masses give",
         ),
         (
             lambda m: {"displacement": m.displacement + 0.2},
