@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
-from scipy.stats import norm
+from scipy.special import ndtr
 
 from ...codegen.system.evaluation import MatrixEvaluator
 from ...model.equations.noise import DEVIATION
@@ -386,7 +386,7 @@ def _behind(
     factors, direction = np.ones(1), None
     if len(rows) > 1:
         law = NormOfNormal(means, sum(by_source.values(), np.zeros((1, 1))) if combined else by_source[WIND])
-        level = float(law.percentile(float(norm.sf(sigmas)))) if level is None else level
+        level = float(law.percentile(float(ndtr(-sigmas)))) if level is None else level
         direction = float(law.direction(level).most_likely)
         factors = np.array([math.cos(direction), math.sin(direction)])
     mean = float(factors @ means)

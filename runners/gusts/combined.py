@@ -12,8 +12,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 from scipy.optimize import root_scalar
-from scipy.special import ndtri
-from scipy.stats import norm
+from scipy.special import ndtr, ndtri
 
 from ...model.system.names import COMBINED, TURBULENCE, WIND
 from ...model.vehicle.biases import WIND_BIAS
@@ -165,7 +164,7 @@ def mixture_level(means: NDArray[np.float64], std: float, chance: float) -> floa
         return float(np.quantile(np.abs(means), 1 - chance, method="higher"))
 
     def passed(level: float) -> float:
-        return float(np.mean(norm.sf((level - means) / std) + norm.cdf((-level - means) / std))) - chance
+        return float(np.mean(ndtr((means - level) / std) + ndtr((-level - means) / std))) - chance
 
     bracket = (0.0, largest + 10 * std)
     return float(root_scalar(passed, bracket=bracket, method="brentq", xtol=1e-12 * (largest + std)).root)

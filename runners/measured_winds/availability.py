@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
-from scipy.stats import chi2, norm
+from scipy.special import gammaincinv, ndtri
 
 from ...codegen.system.evaluation import MatrixEvaluator
 from ...model.errors import ParameterValueError
@@ -293,10 +293,10 @@ def _interval(
         return float(np.log(max(total, np.finfo(float).tiny)))
 
     nu, tail, here = samples - 1, 0.5 * (1 - CONFIDENCE), chance(1.0, 0.0)
-    z = float(norm.ppf(1 - tail))
+    z = float(ndtri(1 - tail))
     ends = []
     for sign, quantile in ((-1, 1 - tail), (1, tail)):
-        by_variance = chance(nu / float(chi2.ppf(quantile, nu)), 0.0) - here
+        by_variance = chance(nu / float(2 * gammaincinv(0.5 * nu, quantile)), 0.0) - here
         by_mean = chance(1.0, sign * z) - here
         ends.append(float(np.exp(sign * np.hypot(by_variance, by_mean))))
     return ends[0], ends[1]

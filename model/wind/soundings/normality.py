@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import beta, binom, chi2, norm
+from scipy.special import bdtr, bdtrc, betaincinv, chdtrc, ndtr, ndtri
 
 from .sounding import SoundingError
 
@@ -88,11 +88,11 @@ def normality(values: ArrayLike, independent: float | None = None) -> Normality:
     size = np.abs(d) / np.sqrt(m2 * count / (count - 1))
     beyond = np.where(np.isfinite(x), size > TAIL, False).sum(axis=0) / count
     far = np.where(np.isfinite(x), size > FAR, False).sum(axis=0) / count
-    trials, p = round(n), 2 * norm.sf(TAIL)
+    trials, p = round(n), 2 * ndtr(-TAIL)
     hits = np.round(beyond * trials)
-    one_side = np.minimum(binom.cdf(hits, trials, p), binom.sf(hits - 1, trials, p))
+    one_side = np.minimum(bdtr(hits, trials, p), bdtrc(hits - 1, trials, p))
     return Normality(
-        skewness, kurtosis - 3, by_skewness, by_kurtosis, chi2.sf(by_skewness**2 + by_kurtosis**2, 2), beyond, far,
+        skewness, kurtosis - 3, by_skewness, by_kurtosis, chdtrc(2, by_skewness**2 + by_kurtosis**2), beyond, far,
         np.minimum(2 * one_side, 1.0), n,
     )  # fmt: skip
 
@@ -132,9 +132,9 @@ def quantile_band(count: int, independent: float, confidence: float = 0.9) -> tu
     """
     p = (np.arange(count) + 0.5) / count
     a, b = p * independent + 0.5, (1 - p) * independent + 0.5
-    ends = (beta.ppf(q, a, b) for q in (0.5 * (1 - confidence), 0.5 * (1 + confidence)))
-    low, high = (norm.ppf(np.clip(end, 1e-12, 1 - 1e-12)) for end in ends)
-    return norm.ppf(p), low, high
+    ends = (betaincinv(a, b, q) for q in (0.5 * (1 - confidence), 0.5 * (1 + confidence)))
+    low, high = (ndtri(np.clip(end, 1e-12, 1 - 1e-12)) for end in ends)
+    return ndtri(p), low, high
 
 
 def skewed_level(mean: ArrayLike, std: ArrayLike, skewness: ArrayLike, kurtosis: ArrayLike, k: float) -> NDArray:

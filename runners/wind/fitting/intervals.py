@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import chi2
+from scipy.special import gammaincinv
 
 from ....model.errors import DataError
 
@@ -40,8 +40,8 @@ def covariance_interval(
     sigma = np.sqrt(np.diag(matrix))
     scale = np.outer(sigma, sigma)
     r = np.clip(matrix / scale, -1.0, 1.0)
-    factor_low = freedom / chi2.ppf(0.5 + confidence / 2, freedom)
-    factor_high = freedom / chi2.ppf(0.5 - confidence / 2, freedom)
+    factor_low = freedom / (2 * gammaincinv(0.5 * freedom, 0.5 + confidence / 2))
+    factor_high = freedom / (2 * gammaincinv(0.5 * freedom, 0.5 - confidence / 2))
     plus, minus = (1 + r) / 2, (1 - r) / 2
     down, up = 1 - factor_low, factor_high - 1
     low = r - np.sqrt((down * plus) ** 2 + (up * minus) ** 2)
