@@ -87,7 +87,7 @@ def run(
     from ..statistics.engines import engine_from
     from ..statistics.larger_side import LABEL
     from ..statistics.norm import LIKE_3_SIGMA
-    from ..statistics.peak_check import weighting_at, with_peak_check
+    from ..statistics.peak_check import with_peak_check
     from ..statistics.peaks_of_resultants import with_resultant_check
     from ..statistics.percentiles import checked_probabilities
     from ..statistics.response_figures import response_figure, weighting_figure
@@ -136,24 +136,26 @@ def run(
     own = trajectory_angle(flown, end_times) if flown.file.planes != "yaw" else None
     if own is not None:
         job.written.append(write_text(job.folder / "trajectory_angle_of_attack.csv", trajectory_angle_csv(own)))
-    with on_terminal():
-        check = _check_peaks(study, statistics)
-    if check is not None:
-        statistics = with_peak_check(statistics, check, study)
-        statistics.save(job.folder)
-        families = sorted({*families, *(p.time for p in check.peaks[:1] if p.time > study.system.start)})
-    both_check = None
-    if both is not None:
+    computed = statistics
+    try:
         with on_terminal():
-            both_check = _check_resultants(study, both)
-        if both_check is not None:
-            statistics = with_resultant_check(statistics, both_check)
+            check = _check_peaks(study, statistics)
+        if check is not None:
+            statistics = with_peak_check(statistics, check, study)
+            families = sorted({*families, *(p.time for p in check.peaks[:1] if p.time > study.system.start)})
+        both_check = None
+        if both is not None:
+            with on_terminal():
+                both_check = _check_resultants(study, both)
+            if both_check is not None:
+                statistics = with_resultant_check(statistics, both_check)
+        loads = _flight_loads(study, end_times, (DESIGN, *chances))
+        if loads:
+            statistics = with_flight_levels(statistics, loads)
+    finally:  # once for all of them, and in time for an interrupt
+        if statistics is not computed:
             statistics.save(job.folder)
-    loads = _flight_loads(study, end_times, (DESIGN, *chances))
-    if loads:
-        statistics = with_flight_levels(statistics, loads)
-        statistics.save(job.folder)
-    with steps("figures", len(study.system.outputs) + len(families) + 1) as bar:
+    with steps("figures", len(study.system.outputs) + 2) as bar:
         if both is not None:
             job.written += _resultant_figures(both, flown.title, job.folder)
         drawn = _drawn(study, statistics, end_times, chosen)
@@ -162,10 +164,8 @@ def run(
             figure = response_figure(statistics.dataset, output.name, title, drawn)
             job.written += write_figure(figure, job.folder, output.name)
             bar.done()
-        weighting = []
-        for t in families:
-            weighting.append(study.weighting_function(t) if check is None else weighting_at(study, check, t))
-            bar.done()
+        weighting = _weighting(study, statistics, check, families)
+        bar.done()
         if weighting:
             first = study.system.outputs[0]
             title = f"{flown.title}\nWeighting function from wind to {words(first.name)}"
@@ -235,6 +235,21 @@ def _drawn(
         return None
     times = drawn_times(end_times, study.executable.stops(end_times[-1]).times)
     return study.response_statistics(times, engine=engine).dataset
+
+
+def _weighting(
+    study: Study, statistics: ResponseStatistics, check: PeakCheck | None, times: list[float]
+) -> list[xr.Dataset]:
+    """Return the weighting functions of end times: the check's own, the others by one sweep where the run is one."""
+    from ..statistics.peak_check import SPACING, weighting_at
+    from ..statistics.sweep import Sweep
+
+    others = [time for time in times if check is None or time not in check.histories]
+    found = {}
+    if others and statistics.attrs["engine"] == Sweep.name:
+        swept = study.weighting_functions(others, spacing=SPACING)
+        found = {time: swept.sel(time=time, t=slice(None, time)).assign_attrs(t2_s=time) for time in others}
+    return [found[time] if time in found else weighting_at(study, check, time) for time in times]
 
 
 def _compute_for_report(study: Study, loads: list[FlightLoad], job: Job) -> None:

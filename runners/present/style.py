@@ -11,6 +11,8 @@ import numpy as np
 from matplotlib import figure as matplotlib_figure
 from matplotlib import rc_context
 from matplotlib.axis import Axis, Tick
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.text import Text
 from matplotlib.ticker import FixedFormatter, FuncFormatter
 from numpy.typing import ArrayLike
@@ -29,6 +31,7 @@ DISPLAY = {
 NEWTONS = ("N", "N m", "N m/rad")
 PREFIXES = ((1e6, "M"), (1e3, "k"), (1.0, ""))  # of newtons: the first that leaves the largest value at 1 or more
 BRITISH = {"center": "centre", "generalized": "generalised"}  # names are American, prose is not
+PIXELS = 150  # an inch, of PNG files
 TITLE_WIDTH = 76  # characters across a figure of 8 inches
 STYLE: dict[Any, Any] = {
     "figure.figsize": (8.0, 5.0),
@@ -85,16 +88,20 @@ def words(name: str) -> str:
 
 
 def write_figure(figure: matplotlib_figure.Figure, folder: Path, name: str) -> list[Path]:
-    """Write a figure as PNG and SVG; a dollar sign in a title or name stays one."""
+    """Write a figure as PNG and SVG; a dollar sign in a title or name stays one.
+
+    By the canvases themselves: ``savefig`` draws every figure twice, once for its layout.
+    """
     name = file_name(name)
     _take_dollars_as_written(figure)
     with rc_context(STYLE):
-        figure.draw_without_rendering()
-        figure.set_layout_engine("none")  # what it has found holds for both files; each would look for it twice
-        return [
-            write_whole(folder / f"{name}.png", lambda p: figure.savefig(p, dpi=150)),
-            write_whole(folder / f"{name}.svg", lambda p: figure.savefig(p, metadata={"Date": None})),
-        ]
+        figure.dpi = PIXELS
+        png = write_whole(folder / f"{name}.png", lambda p: FigureCanvasAgg(figure).print_png(p))
+        figure.set_layout_engine("none")  # what it has found holds for both files
+        svg = write_whole(
+            folder / f"{name}.svg", lambda p: FigureCanvasSVG(figure).print_svg(str(p), metadata={"Date": None})
+        )
+    return [png, svg]
 
 
 def _take_dollars_as_written(figure: matplotlib_figure.Figure) -> None:

@@ -218,9 +218,11 @@ def _weighting(check: PeakCheck, case: Case) -> dict[str, tuple]:
     }
 
 
-def weighting_at(case: Case, check: PeakCheck, time: float) -> xr.Dataset:
+def weighting_at(case: Case, check: PeakCheck | None, time: float) -> xr.Dataset:
     """Return the weighting functions at an end time, those of the check where it is a peak's."""
-    history = check.histories.get(time) or AdjointSolver(case.with_means, Cvodes()).history(time, SPACING)
+    history = (check.histories if check else {}).get(time) or AdjointSolver(case.with_means, Cvodes()).history(
+        time, SPACING
+    )
     return weighting_dataset(case, time, history)
 
 
