@@ -12,10 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import DataError, DataErrorCollector, suggestion
-from .numbers import parse_number
+from .numbers import parse_number, parse_row
 from .text_file import read_text
 
 Order = Literal["increasing", "not decreasing", "any"]
+QUOTED = re.compile(r'["\r\0]')  # where cells are more than what stands between commas
 _HEADER = re.compile(r"^\s*(?P<name>[^\[\]]+?)\s*\[(?P<unit>[^\[\]]*)\]\s*$")
 
 
@@ -98,6 +99,9 @@ def read_csv_table(
             why = f"has {len(cells)} cells where the header has {len(names)}"
             collector.errors.append(DataError(why, file=file, row=line))
             continue
+        if not text and (values := parse_row(cells)) is not None:
+            data[i] = values
+            continue
         for j, cell in enumerate(cells):
             if names[j] not in text:
                 try:
@@ -147,15 +151,23 @@ def read_rows(file: Path) -> list[tuple[int, list[str]]]:
         if not line.strip() or line.lstrip().startswith("#"):
             continue
         try:
-            (cells,) = csv.reader([line], strict=True)
+            (cells,) = csv.reader([line], strict=True) if QUOTED.search(line) else (line.split(","),)
         except csv.Error as error:
             raise DataError(
                 f"cannot be read ({error}); a line is a row of cells with commas between them", file=file, row=number
             ) from None
         if any(c.strip() for c in cells):
             rows.append((number, cells))
-    filled = max((max(j for j, c in enumerate(cells) if c.strip()) + 1 for _, cells in rows), default=0)
+    filled = max((_filled(cells) for _, cells in rows), default=0)
     return [(number, cells[:filled]) for number, cells in rows]
+
+
+def _filled(cells: list[str]) -> int:
+    """Return the number of cells up to the last that is not blank."""
+    count = len(cells)
+    while not cells[count - 1].strip():
+        count -= 1
+    return count
 
 
 def _read_header(file: Path, line: int, header: list[str], text: tuple[str, ...]) -> tuple[list[str], dict[str, str]]:
