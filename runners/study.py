@@ -5,55 +5,37 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
-import xarray as xr
 from numpy.typing import ArrayLike
 
-from ..codegen.sweep.compiled import sweep_of
 from ..model.errors import IntegrationError, ParameterValueError
 from ..model.system.names import COMBINED
-from ..model.wind.soundings.collection import Soundings
-from ..model.wind.soundings.sounding import Sounding
 from .case.case import Case
-from .case.climb import Climb
 from .case.times import end_times
-from .design_wind.design_wind import DesignWind, design_wind
-from .export.matrix_grid import default_grid, matrix_grid
-from .export.state_space import state_space
-from .flight_load.limit_table import Limits
-from .flight_load.limits import limit_passage
-from .flight_load.load import DESIGN, DRAWS, FlightLoad, flight_load
-from .flight_load.passage import Passage
-from .flight_load.window import checked_window
-from .gusts.response import gust_response
-from .gusts.search import GustSweep, gust_sweep
-from .gusts.shapes import Gust, OneMinusCosine
-from .measured_winds.availability import availability
-from .measured_winds.day_of_launch import ERROR, THRESHOLD, Balloon, DayOfLaunch, day_of_launch
-from .measured_winds.fly import FlownWinds, fly
-from .measured_winds.met_winds import met_winds
-from .measured_winds.predictor import predict_wind
-from .measured_winds.wind_field import Lasting, measured_persistence, wind_field
-from .present.progress import each, steps
-from .sensitivity.check import check_sensitivity
-from .sensitivity.many import sensitivities
-from .sensitivity.one import sensitivity
-from .sensitivity.percentile import percentile_sensitivity
-from .sensitivity.second import second_derivatives
-from .solvers.adjoint import AdjointSolver, adjoint_member
-from .solvers.sweep import batch, interpreted_weighting, sweep
-from .station_loads.loads_along_vehicle import resultant_along_vehicle
-from .statistics.cvodes import Cvodes
-from .statistics.dataset import batch_dataset, with_members
-from .statistics.engine import Engine, Progress
-from .statistics.engines import engine_as, engine_of_options, find_engine, response_statistics
-from .statistics.exact_penetration import check_gust_penetration
+from .flight_load.request import DESIGN, DRAWS
+from .measured_winds.defaults import ERROR, THRESHOLD
 from .statistics.norm import LIKE_3_SIGMA
-from .statistics.percentiles import Sides
-from .statistics.results import ResponseStatistics
-from .statistics.sweep import Sweep
-from .statistics.weighting import weighting_dataset, weighting_family
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from ..model.wind.soundings.collection import Soundings
+    from ..model.wind.soundings.sounding import Sounding
+    from .design_wind.design_wind import DesignWind
+    from .flight_load.limit_table import Limits
+    from .flight_load.load import FlightLoad
+    from .flight_load.passage import Passage
+    from .gusts.search import GustSweep
+    from .gusts.shapes import Gust
+    from .measured_winds.day_of_launch import Balloon, DayOfLaunch
+    from .measured_winds.fly import FlownWinds
+    from .measured_winds.wind_field import Lasting
+    from .statistics.cvodes import Cvodes
+    from .statistics.engine import Engine, Progress
+    from .statistics.percentiles import Sides
+    from .statistics.results import ResponseStatistics
+    from .statistics.sweep import Sweep
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -127,6 +109,8 @@ class Study(Case):
         -----
         UnstableSystemWarning, UncheckedStatisticsWarning
         """
+        from .statistics.engines import engine_of_options, response_statistics
+
         return response_statistics(
             self,
             times,
@@ -172,6 +156,16 @@ class Study(Case):
         ------
         TimeRangeError, UnknownNameError, ParameterValueError, IntegrationError, NoCompilerError
         """
+        from ..codegen.sweep.compiled import sweep_of
+        from .present.progress import each, steps
+        from .solvers.adjoint import adjoint_member
+        from .solvers.sweep import batch
+        from .statistics.cvodes import Cvodes
+        from .statistics.dataset import batch_dataset, with_members
+        from .statistics.engines import engine_of_options, find_engine
+        from .statistics.results import ResponseStatistics
+        from .statistics.sweep import Sweep
+
         if not parameter_sets:
             raise ParameterValueError("a batch needs at least one set of parameter values")
         ends = self.checked_times(end_times(times))
@@ -239,6 +233,12 @@ class Study(Case):
         ------
         TimeRangeError, IntegrationError, NoCompilerError
         """
+        from ..codegen.sweep.compiled import sweep_of
+        from .solvers.sweep import interpreted_weighting, sweep
+        from .statistics.engines import engine_as, engine_of_options
+        from .statistics.sweep import Sweep
+        from .statistics.weighting import weighting_family
+
         ends = self.checked_times(end_times(times))
         self.check_spacing(spacing)
         if engine is None and options is None and self.executable.shared_library is None:
@@ -291,6 +291,11 @@ class Study(Case):
         ------
         TimeRangeError, IntegrationError
         """
+        from .solvers.adjoint import AdjointSolver
+        from .statistics.cvodes import Cvodes
+        from .statistics.engines import engine_as, engine_of_options
+        from .statistics.weighting import weighting_dataset
+
         self.checked_times([time])
         self.check_spacing(spacing)
         what = "the weighting functions of one end time are computed"
@@ -353,6 +358,8 @@ class Study(Case):
         Rare passages are drawn by a mixture over times (Adler, Blanchet and Liu 2012), between points of the grid as
         Brownian bridges where white noise reaches the response's rate.
         """
+        from .flight_load.load import flight_load
+
         return flight_load(self, response, window, probabilities, sides, draws, seed, limit)
 
     def limit_passage(
@@ -399,6 +406,8 @@ class Study(Case):
         UncheckedStationsWarning
             The vehicle has stations outside those of the table.
         """
+        from .flight_load.limits import limit_passage
+
         return limit_passage(self, limits, window, probability, sides, draws, seed)
 
     def resultant_along_vehicle(
@@ -425,6 +434,8 @@ class Study(Case):
             The vehicle flies in one plane.
         NoVehicleError, DataError, TimeRangeError, UnknownNameError, ParameterValueError, IntegrationError
         """
+        from .station_loads.loads_along_vehicle import resultant_along_vehicle
+
         return resultant_along_vehicle(self, times, load=load, probability=probability)
 
     def percentile_sensitivity(
@@ -459,6 +470,9 @@ class Study(Case):
             The system has one plane.
         UnknownNameError, TimeRangeError, ParameterValueError, DirectNoiseError, NoCompilerError, IntegrationError
         """
+        from .present.progress import steps
+        from .sensitivity.percentile import percentile_sensitivity
+
         with steps("sensitivities of a level"):
             return percentile_sensitivity(self, resultant, time, probability, parameters)
 
@@ -500,6 +514,8 @@ class Study(Case):
         E[w(h) | y] = mean + cov(w(h), y) (L - E[y]) / Var[y], with a corner at h(t2). Of all histories of the filter's
         white noise that make the load it is that of least norm, k.
         """
+        from .design_wind.design_wind import design_wind
+
         return design_wind(self, response, time, sigmas, combined)
 
     def gust_response(
@@ -534,6 +550,8 @@ class Study(Case):
         ------
         GustError, TimeRangeError, UnknownNameError, ParameterValueError, NoVehicleError, DataError, IntegrationError
         """
+        from .gusts.response import gust_response
+
         return gust_response(self, gust, start_altitude, times, responses, direction)
 
     def gust_sweep(
@@ -567,6 +585,9 @@ class Study(Case):
         ------
         GustError, TimeRangeError, UnknownNameError, ParameterValueError, NoVehicleError, DataError, IntegrationError
         """
+        from .gusts.search import gust_sweep
+        from .gusts.shapes import OneMinusCosine
+
         return gust_sweep(self, OneMinusCosine() if gust is None else gust, times, responses, lengths)
 
     def fly(
@@ -607,6 +628,9 @@ class Study(Case):
         ------
         NoVehicleError, DataError, SoundingError, UnknownNameError, TimeRangeError, DirectNoiseError
         """
+        from .measured_winds.fly import fly
+        from .present.progress import steps
+
         with steps("flights through measured winds"):
             return fly(self, profiles, times, responses, component, sign)
 
@@ -632,6 +656,8 @@ class Study(Case):
         ------
         TimeRangeError, ExportError
         """
+        from .export.matrix_grid import default_grid, matrix_grid
+
         return matrix_grid(self, default_grid(self) if times is None else times)
 
     def to_statespace(self, time: float, *, library: Literal["control", "scipy"] = "control") -> Any:
@@ -655,6 +681,8 @@ class Study(Case):
         MissingLibraryError
             python-control is not installed.
         """
+        from .export.state_space import state_space
+
         return state_space(self, time, library)
 
     def day_of_launch(
@@ -717,6 +745,9 @@ class Study(Case):
         -----
         CertainPassageWarning
         """
+        from .measured_winds.day_of_launch import day_of_launch
+        from .present.progress import steps
+
         with steps("what the balloons say"):
             return day_of_launch(
                 self, soundings, hours_before, limits, window, responses, persistence, error, threshold, sides, draws,
@@ -774,6 +805,8 @@ class Study(Case):
         ------
         NoVehicleError, DataError, LimitError, UnknownNameError, ParameterValueError, TimeRangeError
         """
+        from .measured_winds.availability import availability
+
         return availability(
             self, limits, months, azimuths, winds, window, check_hours, threshold, sides, draws, seed, progress
         )
@@ -804,6 +837,8 @@ class Study(Case):
         ------
         NoVehicleError, ParameterValueError
         """
+        from .measured_winds.predictor import predict_wind
+
         return predict_wind(self, altitude, wind, ahead, error)
 
     def persistence(self, soundings: Soundings, component: str | None = None) -> Lasting:
@@ -825,6 +860,11 @@ class Study(Case):
         ------
         NoVehicleError, SoundingError, ParameterValueError, DataError, UnknownNameError
         """
+        from .case.climb import Climb
+        from .flight_load.window import checked_window
+        from .measured_winds.met_winds import met_winds
+        from .measured_winds.wind_field import measured_persistence, wind_field
+
         met = met_winds(self, component, 1)
         top = float(Climb.of(self).altitude(checked_window(self, None)[1]))
         return measured_persistence(wind_field(self, top), soundings, met.components)
@@ -872,6 +912,9 @@ class Study(Case):
         UndefinedElasticityWarning
             Parameters that are zero; their ``elasticity_defined`` is 0.
         """
+        from .present.progress import steps
+        from .sensitivity.one import sensitivity
+
         self.require_linear_mean("a sensitivity")
         with steps("sensitivities"):
             return sensitivity(self, response, time, source, quantity, parameters, elasticity)
@@ -905,6 +948,8 @@ class Study(Case):
         ------
         UnknownNameError, StructuralParameterError, TimeRangeError, DirectNoiseError, ZeroQuantityError
         """
+        from .sensitivity.many import sensitivities
+
         self.require_linear_mean("a sensitivity")
         return sensitivities(self, responses, times, source, quantity, parameters)
 
@@ -941,6 +986,8 @@ class Study(Case):
             For none or more than ten parameters.
         UnknownNameError, StructuralParameterError, TimeRangeError, DirectNoiseError, ZeroQuantityError
         """
+        from .sensitivity.second import second_derivatives
+
         self.require_linear_mean("a second derivative")
         return second_derivatives(self, response, time, parameters, source, quantity)
 
@@ -961,6 +1008,8 @@ class Study(Case):
         ------
         DataError, NoVehicleError, TimeRangeError, IntegrationError
         """
+        from .statistics.exact_penetration import check_gust_penetration
+
         return check_gust_penetration(self, time)
 
     def check_sensitivity(
@@ -992,5 +1041,7 @@ class Study(Case):
         ------
         UnknownNameError, StructuralParameterError, TimeRangeError, DirectNoiseError, ZeroQuantityError
         """
+        from .sensitivity.check import check_sensitivity
+
         self.require_linear_mean("a sensitivity")
         return check_sensitivity(self, response, time, source, quantity, parameters, rows)

@@ -135,6 +135,12 @@ def modules_after(*program: str) -> set[str]:
     return set(done.stderr.splitlines())
 
 
+def test_a_study_is_loaded_without_what_draws_and_labels():
+    code = "import sys; from ascentwind import Study; Study.load('as504', compile=False); print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=300)
+    assert not {"matplotlib", "xarray", "pandas", "scipy.stats", "dask", "distributed"} & set(done.stdout.split())
+
+
 @pytest.mark.parametrize(
     "program",
     [

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
-import jinja2
+from functools import cache
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import jinja2
 
 
 def render(template: str, **values: object) -> str:
@@ -15,7 +19,7 @@ def render(template: str, **values: object) -> str:
     values : objects
         By name; one that the template asks for and is not given is an error.
     """
-    return _ENVIRONMENT.get_template(template).render(values)
+    return _environment().get_template(template).render(values)
 
 
 def comment(text: object) -> str:
@@ -25,11 +29,16 @@ def comment(text: object) -> str:
     return one_line.replace("\\", "|").replace("??/", "? ? |").replace("*/", "* /").replace("/*", "/ *")
 
 
-_ENVIRONMENT = jinja2.Environment(
-    loader=jinja2.PackageLoader("ascentwind.codegen"),
-    undefined=jinja2.StrictUndefined,
-    keep_trailing_newline=True,
-    trim_blocks=True,
-    lstrip_blocks=True,
-)
-_ENVIRONMENT.filters["comment"] = comment
+@cache
+def _environment() -> jinja2.Environment:
+    import jinja2  # asked for only where C is written
+
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("ascentwind.codegen"),
+        undefined=jinja2.StrictUndefined,
+        keep_trailing_newline=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["comment"] = comment
+    return environment

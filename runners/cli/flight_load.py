@@ -66,9 +66,8 @@ def flight_load(
     from ..flight_load.files import write_flight_loads, write_passage, write_sensitivities
     from ..flight_load.limit_table import Limits
     from ..flight_load.limits import checked_limits
-    from ..flight_load.load import DESIGN
     from ..flight_load.margin_figure import margin_figure
-    from ..flight_load.request import NoVarianceError, checked_draws
+    from ..flight_load.request import DESIGN, NoVarianceError, checked_draws
     from ..flight_load.uncertain_parameter import checked_spread
     from ..flight_load.window import checked_window
     from ..present.style import words, write_figure

@@ -81,7 +81,7 @@ def run(
     from ...model.vehicle.planes import BOTH
     from ..case.times import parse_times
     from ..flight_load.files import with_flight_levels
-    from ..flight_load.load import DESIGN
+    from ..flight_load.request import DESIGN
     from ..present.files import write_text
     from ..present.style import words, write_figure
     from ..statistics.engines import engine_from

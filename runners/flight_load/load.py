@@ -42,10 +42,8 @@ from .upcrossings import upcrossing_rate
 from .wind_interval import wind_interval_of
 from .window import checked_window
 
-DESIGN = 0.00135  # 1 - Phi(3): with this chance an instant passes mean + 3 sigma
 SPACING_ERROR = 0.02  # relative, of a probability; finer where it is larger
 FREEDOM = 0.03  # of a variance
-DRAWS = 2000
 MOVED = 8000  # draws of paths that just reach a level, of which derivatives are made
 BINS = 60  # of the time of the maximum
 SIDES = "upper", "lower"

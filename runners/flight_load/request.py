@@ -10,6 +10,9 @@ from ...model.errors import AscentwindError, AscentwindWarning, ParameterValueEr
 if TYPE_CHECKING:
     from .norms import Process
 
+DESIGN = 0.00135  # 1 - Phi(3): with this chance an instant passes mean + 3 sigma
+DRAWS = 2000
+
 
 class NoVarianceError(AscentwindError):
     """A load that no noise reaches has no odds: its maximum is the same on every flight."""

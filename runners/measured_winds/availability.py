@@ -29,10 +29,9 @@ from ..case.case import Case
 from ..case.climb import Climb
 from ..case.provenance import provenance
 from ..flight_load.limit_table import Limits
-from ..flight_load.load import DESIGN
 from ..flight_load.passage import Passage
 from ..flight_load.process import joint_covariance
-from ..flight_load.request import checked_draws
+from ..flight_load.request import DESIGN, checked_draws
 from ..flight_load.window import checked_window, window_chain
 from ..present.progress import each
 from ..solvers.markov_chain import MarkovChain
@@ -40,7 +39,8 @@ from ..solvers.time_nodes import interval_before
 from ..statistics.norm import NormOfNormal
 from ..statistics.percentiles import Sides, checked_sides, instant_level
 from .conditioning import Measured
-from .day_of_launch import ERROR, matter, worth_while
+from .day_of_launch import matter, worth_while
+from .defaults import ERROR
 from .level_weights import WINDS
 from .limited_loads import LimitedLoads, limited_loads, row_weights, symmetric
 from .other_winds import in_mean_winds

@@ -31,11 +31,10 @@ from ..case.case import Case
 from ..case.climb import Climb
 from ..case.provenance import provenance
 from ..flight_load.limit_table import LimitError, Limits
-from ..flight_load.load import DESIGN
 from ..flight_load.passage import Passage
 from ..flight_load.probability import Estimate
 from ..flight_load.process import joint_covariance
-from ..flight_load.request import checked_draws
+from ..flight_load.request import DESIGN, checked_draws
 from ..flight_load.window import checked_window, window_chain
 from ..present.netcdf import RULE
 from ..present.notebook import html_of
@@ -59,10 +58,8 @@ MOST_KEPT = 10_000  # loads and close times whose weights are made at once
 MOST_VALUES = 2000  # loads and times whose joint covariance is made: its draws take a second
 LEFT_OUT = 2e-3  # of the instants' chances, at either end
 FEWEST = 4  # coarse steps looked at
-ERROR = 1.0  # m/s in a component, of a balloon's wind
 CLOCK = 1.5  # h that dates of balloons and their hours before launch may differ: files are dated by the nearest hour
 NEAREST = 50.0  # m: levels nearer to the one below are passed over, whose errors are not independent
-THRESHOLD = 0.01
 BAND = 1.645  # conditional sigmas to either side, which hold 90 %
 
 Balloon = str | Path | Sounding | Soundings
