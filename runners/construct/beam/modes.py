@@ -83,10 +83,13 @@ def followed_modes(
     amounts = {name: np.broadcast_to(np.asarray(v, dtype=float), times.shape) for name, v in liquid.items()}
     nodes = beam_edges(construction) if edges is None else np.asarray(edges, dtype=float)
     whole = FreeBeam.of(construction, nodes)
+    # all at once: the level of a tank is searched for, and costs as much for one time as for hundreds
+    lines = np.broadcast_to(mass_line(construction, nodes, amounts), (times.size, nodes.size - 1))
+    known = dict(zip(times.tolist(), lines, strict=True))
 
     def at(now: float) -> tuple[FreeBeam, NDArray[np.float64]]:
         there = {name: float(np.interp(now, times, v)) for name, v in amounts.items()}
-        masses = mass_line(construction, nodes, there)
+        masses = known[now] if now in known else mass_line(construction, nodes, there)
         if not construction.grains and not construction.jettisons:
             return whole, masses
         return whole.with_rotary(rotary_line(construction, nodes, there)), masses
