@@ -150,8 +150,9 @@ def read_rows(file: Path) -> list[tuple[int, list[str]]]:
     for number, line in enumerate(read_text(file).split("\n"), start=1):
         if not line.strip() or line.lstrip().startswith("#"):
             continue
+        plain = not QUOTED.search(line) and len(line) <= csv.field_size_limit()
         try:
-            (cells,) = csv.reader([line], strict=True) if QUOTED.search(line) else (line.split(","),)
+            (cells,) = [line.split(",")] if plain else csv.reader([line], strict=True)
         except csv.Error as error:
             raise DataError(
                 f"cannot be read ({error}); a line is a row of cells with commas between them", file=file, row=number
