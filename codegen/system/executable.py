@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cache, cached_property
 
 import casadi as ca
 import numpy as np
@@ -13,7 +14,7 @@ from ...model.deprecation import warn_deprecated
 from ...model.system.linear_system import LinearSystem
 from ...model.system.time_conditions import Stops
 from ...model.tables import TableGroup, run_time_vector, table_values
-from ..toolchain.library import Libraries, Library, Recipe
+from ..toolchain.library import Libraries, Library, Recipe, compile_together
 from .covariance import compiled_rate, interpreted_derivative, size_of
 from .functions import (
     MATRICES,
@@ -123,8 +124,12 @@ class ExecutableSystem:
         )
 
 
-def executable_system(system: LinearSystem, compile: bool = True) -> ExecutableSystem:
+def executable_system(
+    system: LinearSystem, compile: bool = True, together: Callable[[LinearSystem], Recipe] | None = None
+) -> ExecutableSystem:
     """Generate, compile and load a system; without a compiler, on request, or where they differ, use the interpreter.
+
+    Where the system itself has to be compiled, so is ``together``, at the same time: what will be asked for next.
 
     Raises
     ------
@@ -133,7 +138,10 @@ def executable_system(system: LinearSystem, compile: bool = True) -> ExecutableS
     """
     nominal = np.array([p.value for p in system.parameters])
     interpreted = ExecutableSystem(system, core_functions(system), None, system.tables, nominal, may_compile=compile)
-    return replace(interpreted, shared_library=system_recipe(interpreted).load(compile))
+    recipe = system_recipe(interpreted)
+    if compile and together is not None:
+        compile_together(recipe, lambda: [together(system)])
+    return replace(interpreted, shared_library=recipe.load(compile))
 
 
 def system_recipe(interpreted: ExecutableSystem) -> Recipe:
@@ -142,7 +150,7 @@ def system_recipe(interpreted: ExecutableSystem) -> Recipe:
     return Recipe(
         system,
         "",
-        fingerprint=lambda: source_fingerprint(system, core),
+        fingerprint=cache(lambda: source_fingerprint(system, core)),
         source=lambda: c_source(system, core),
         difference=lambda library: difference_from_core(replace(interpreted, shared_library=library)),
         agreement=AGREEMENT,

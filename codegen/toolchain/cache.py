@@ -141,6 +141,16 @@ def compiled_library(
     return CompiledLibrary(path, key, True)
 
 
+def is_compiled(name: str, fingerprint: str, compiler: Compiler) -> bool:
+    """Return whether the cache has a library, whole; arguments as of :func:`compiled_library`.
+
+    Raises
+    ------
+    CacheError
+    """
+    return _intact(cache_folder() / f"{file_name(name)}-{content_key(fingerprint, compiler)}.so")
+
+
 def set_aside(library: CompiledLibrary) -> None:
     """Move a library that gives wrong numbers out of the way, so that the next process makes it again."""
     with contextlib.suppress(OSError):  # of a read-only cache; it is not used here in any case

@@ -15,9 +15,11 @@ from functools import lru_cache
 from pathlib import Path
 
 from ...model.errors import AscentwindError
+from .interruption import refuse_if_stopped
 
 FLAGS = ("-std=c99", "-O2", "-fPIC", "-shared")
 NATIVE = "-march=native"
+PATIENCE = 0.1  # s, until it is looked whether anyone still waits for a program
 
 
 class CompilerError(AscentwindError):
@@ -87,6 +89,8 @@ def run_program(
 ) -> subprocess.CompletedProcess[str]:
     """Run a program to its end; an exception meanwhile, such as Ctrl-C, ends it with all that it started.
 
+    So does the flag of a thread of :class:`Workers`.
+
     Raises
     ------
     CompilerError
@@ -102,11 +106,21 @@ def run_program(
         raise CompilerError(list(command), 126, f"{command[0]} cannot be run ({error.strerror or error})") from None
     with process:
         try:
-            printed, complained = process.communicate(given)
+            printed, complained = _communicated(process, given)
         except BaseException:
             _end(process)
             raise
     return subprocess.CompletedProcess(command, process.returncode, printed, complained)
+
+
+def _communicated(process: subprocess.Popen[str], given: str) -> tuple[str, str]:
+    to_give: str | None = given
+    while True:
+        try:
+            return process.communicate(to_give, timeout=PATIENCE)
+        except subprocess.TimeoutExpired:
+            to_give = None  # it has what it was given
+            refuse_if_stopped()
 
 
 def _end(process: subprocess.Popen[str]) -> None:

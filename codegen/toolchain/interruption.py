@@ -142,5 +142,12 @@ def interruptible(function: Callable[[NDArray[np.intc]], int]) -> int:
     return code
 
 
+def refuse_if_stopped() -> None:
+    """Raise KeyboardInterrupt in a thread whose flag is raised, such as one that waits for another program."""
+    flag = getattr(_of_thread, "flag", None)
+    if flag is not None and flag[0]:
+        raise KeyboardInterrupt
+
+
 def _lowered() -> NDArray[np.intc]:
     return np.zeros(1, np.intc)

@@ -6,7 +6,8 @@ import ctypes
 import logging
 import threading
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import as_completed
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, TypeVar
@@ -15,9 +16,9 @@ import numpy as np
 
 from ...model.errors import AscentwindError, AscentwindWarning
 from ...model.system.linear_system import LinearSystem
-from .cache import CacheError, CompiledLibrary, compiled_library, set_aside
+from .cache import CacheError, CompiledLibrary, compiled_library, is_compiled, set_aside
 from .compiler import Compiler, find_compiler, optimizing
-from .interruption import interruptible
+from .interruption import Workers, interruptible
 
 T = TypeVar("T")
 
@@ -181,11 +182,32 @@ class Recipe:
             raise CacheError(f"{wrong}; run the same again, which compiles it anew, or {self.way_out}")
         return library
 
-    def _compiled(self, compiler: Compiler) -> Library:
-        name = f"{self.system.name}-{self.part}" if self.part else self.system.name
+    @property
+    def _name(self) -> str:
+        return f"{self.system.name}-{self.part}" if self.part else self.system.name
+
+    def _compiler(self, found: Compiler) -> Compiler:
+        return optimizing(found) if self.optimised else found
+
+    def is_compiled(self, compiler: Compiler) -> bool:
+        """Return whether the cache has the library.
+
+        Raises
+        ------
+        CacheError
+        """
+        return is_compiled(self._name, self.fingerprint(), self._compiler(compiler))
+
+    def written(self, compiler: Compiler) -> Callable[[], CompiledLibrary]:
+        """Write the source, and return what compiles it; symbols belong to one thread, compilers to any."""
         structure = self.system.structure if self.structure is None else self.structure
-        chosen = optimizing(compiler) if self.optimised else compiler
-        found = compiled_library(name, self.fingerprint(), self.source, chosen, dict(structure))
+        text, key, chosen = self.source(), self.fingerprint(), self._compiler(compiler)
+        return lambda: compiled_library(self._name, key, lambda: text, chosen, dict(structure))
+
+    def _compiled(self, compiler: Compiler) -> Library:
+        structure = self.system.structure if self.structure is None else self.structure
+        chosen = self._compiler(compiler)
+        found = compiled_library(self._name, self.fingerprint(), self.source, chosen, dict(structure))
         return Library(found.path, found.key, found.fresh)
 
     def _wrong(self, library: Library) -> str:
@@ -195,6 +217,31 @@ class Recipe:
             return ""
         set_aside(library)
         return f"the compiled library {library.path} differs from the interpreter by {difference:.1e} and was set aside"
+
+
+def compile_together(first: Recipe, others: Callable[[], Sequence[Recipe]]) -> None:
+    """Compile libraries at the same time where the first is not in the cache: a compiler uses one core.
+
+    Whoever takes them afterwards finds them there. An error of the cache is left to them.
+
+    Raises
+    ------
+    CompilerError
+        Of the first that fails; the others are stopped, and nothing of them is left.
+    """
+    compiler = find_compiler()
+    try:
+        if compiler is None or first.is_compiled(compiler):
+            return
+        missing = [first, *(recipe for recipe in others() if not recipe.is_compiled(compiler))]
+        if len(missing) == 1:
+            return
+        jobs = [recipe.written(compiler) for recipe in missing]
+        with Workers(len(jobs)) as pool:
+            for done in as_completed([pool.submit(job) for job in jobs]):
+                done.result()
+    except CacheError:
+        return
 
 
 class Libraries:

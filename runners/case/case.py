@@ -11,7 +11,10 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from ...codegen.sweep.compiled import sweep_recipe
+from ...codegen.sweep.source import sweep_functions
 from ...codegen.system.executable import ExecutableSystem, executable_system
+from ...codegen.toolchain.library import Recipe
 from ...model.equations.assemble import assemble
 from ...model.errors import (
     DataError,
@@ -120,7 +123,7 @@ class Case:
         with steps("equations and their code") as line:
             system = assemble(vehicle, covariance_at(vehicle.wind.shaping_filter, vehicle.start_altitude))
             line.done(f"code of {system.name}")
-            executable = executable_system(system, compile)
+            executable = executable_system(system, compile, _next_compiled)
             check_coupling(executable)
         return cls(executable, vehicle)
 
@@ -538,3 +541,8 @@ class Case:
         names = list(self.system.output_names if responses is None else dict.fromkeys(responses))
         self.system.refuse_direct_noise(names)
         return names
+
+
+def _next_compiled(system: LinearSystem) -> Recipe:
+    """Return what most questions to a vehicle ask for after its own functions."""
+    return sweep_recipe(system, sweep_functions(system))

@@ -28,6 +28,8 @@ def load_study(
     changes: Sequence[str] | None = None,
     shows: Sequence[str] = (),
     turbulence: str | None = None,
+    *,
+    compile: bool = True,
 ) -> Study:
     """Load a vehicle with the changes typed after ``--set``.
 
@@ -40,6 +42,8 @@ def load_study(
         Which of ``SHOWN`` the command reads: another one would change nothing.
     turbulence : str, optional
         What was typed after ``--turbulence``.
+    compile : bool
+        False where so little is computed that compilers would take longer.
 
     Raises
     ------
@@ -51,7 +55,7 @@ def load_study(
     with steps("loading"):
         from ..study import Study
 
-        return Study.load(vehicle, changes=wanted)
+        return Study.load(vehicle, compile=compile, changes=wanted)
 
 
 def checked_changes(changes: Sequence[str] | None, shows: Sequence[str] = ()) -> dict[str, Any]:

@@ -22,7 +22,7 @@ def inspect(
     """Every table value, the matrices A, B, C, D and the roots at a time."""
     from ..views.inspect_system import inspection, print_inspection
 
-    found = inspection(load_study(vehicle, changes), time)
+    found = inspection(load_study(vehicle, changes, compile=False), time)
     if json:
         import json as json_module
 
@@ -51,7 +51,7 @@ def equations(
         raise DataError(f"--by {by} needs --of, the equation to differentiate; 4-1 to 4-13, an output or a state")
     if page is not None:
         refuse_unused(context, ["of", "by"], "with --page, which holds all equations")
-    study = load_study(vehicle, changes)
+    study = load_study(vehicle, changes, compile=False)
     if page is not None:
         text = equations_page(study)
         write_text(page, text)

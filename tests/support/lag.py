@@ -11,7 +11,7 @@ from ascentwind.runners import Study
 TAU, GAIN, INPUT = 2.0, 3.0, 1.5
 
 
-def lag() -> Study:
+def lag(compile: bool = True) -> Study:
     """x' = -x/tau + gain (n + u): variance gain^2 tau/2 (1 - exp(-2t/tau)), mean gain u tau (1 - exp(-t/tau))."""
     x, n, u, tau, gain, level = (ca.SX.sym(s) for s in ("x", "n", "u", "tau", "gain", "level"))
     return Study.from_system(
@@ -24,7 +24,8 @@ def lag() -> Study:
             inputs={"u": (u, level)},
             parameters={"tau": (tau, TAU), "gain": (gain, GAIN), "level": (level, INPUT)},
             end=50.0,
-        )
+        ),
+        compile=compile,
     )
 
 

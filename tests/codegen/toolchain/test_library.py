@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import threading
 import time
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -16,11 +17,19 @@ from lag import closed_form, lag
 import ascentwind
 from ascentwind.codegen.ensemble.compiled import EnsembleNeedsCompilerError, ensemble_of, ensemble_recipe
 from ascentwind.codegen.nodes.compiled import node_functions_of
-from ascentwind.codegen.sweep.compiled import compiled_sweep, sweep_of
+from ascentwind.codegen.sweep.compiled import compiled_sweep, sweep_of, sweep_recipe
+from ascentwind.codegen.sweep.source import sweep_functions
+from ascentwind.codegen.system.executable import executable_system, system_recipe
 from ascentwind.codegen.toolchain import library as library_module
 from ascentwind.codegen.toolchain.cache import CacheError
-from ascentwind.codegen.toolchain.compiler import Compiler
-from ascentwind.codegen.toolchain.library import InterpreterWarning, Libraries, NoCompilerError
+from ascentwind.codegen.toolchain.compiler import Compiler, CompilerError, find_compiler, run_program
+from ascentwind.codegen.toolchain.library import (
+    InterpreterWarning,
+    Libraries,
+    NoCompilerError,
+    Recipe,
+    compile_together,
+)
 from ascentwind.runners import Study
 from ascentwind.runners.solvers.sweep import batch
 
@@ -136,3 +145,54 @@ def test_one_file_of_codegen_and_solvers_imports(module, home):
             if any(name.split(".")[0] == module for name in names):
                 found.add(file.name)
     assert found == {home}
+
+
+def two_recipes() -> tuple[Recipe, Callable[[], list[Recipe]]]:
+    """Return how the libraries of a system itself and of its sweep are made."""
+    system = lag(compile=False).system
+    first = system_recipe(executable_system(system, compile=False))
+    return first, lambda: [sweep_recipe(system, sweep_functions(system))]
+
+
+def test_libraries_are_compiled_at_the_same_time(own_cache, monkeypatch):
+    compile_one, together = Compiler.compile, threading.Barrier(2, timeout=60)
+
+    def meeting(compiler: Compiler, source: Path, library: Path) -> None:
+        together.wait()  # breaks where one is compiled after the other
+        compile_one(compiler, source, library)
+
+    monkeypatch.setattr(Compiler, "compile", meeting)
+    first, others = two_recipes()
+    compile_together(first, others)
+    compiler = find_compiler()
+    assert compiler is not None
+    assert [recipe.is_compiled(compiler) for recipe in (first, *others())] == [True, True]
+    assert len(list(own_cache.glob("*.so"))) == 2
+    compile_together(first, lambda: pytest.fail("the first is there, and so nobody asks for the others"))
+
+
+def test_the_first_compiler_that_fails_stops_the_others_and_leaves_nothing(own_cache, tmp_path, monkeypatch):
+    begun, survived = threading.Event(), tmp_path / "survived"
+
+    def failing(compiler: Compiler, source: Path, library: Path) -> None:
+        if "sweep" in library.parent.name:
+            begun.set()
+            run_program(["sh", "-c", f"sleep 20; touch '{survived}'"])
+        begun.wait(60)
+        raise CompilerError(["cc"], 1, "the first that fails")
+
+    monkeypatch.setattr(Compiler, "compile", failing)
+    with pytest.raises(CompilerError, match="the first that fails"):
+        compile_together(*two_recipes())
+    assert not survived.exists()
+    assert {path.suffix for path in own_cache.iterdir()} <= {".lock", ".json"}
+
+
+def test_a_full_cache_is_left_to_who_asks_for_a_library(own_cache, monkeypatch):
+    def full(*_: object) -> None:
+        raise CompilerError(["cc"], 1, "No space left on device")
+
+    monkeypatch.setattr(Compiler, "compile", full)
+    compile_together(*two_recipes())
+    with pytest.warns(InterpreterWarning, match="disk"):
+        assert lag().executable.shared_library is None
