@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from ascentwind.runners.present.style import words
+from ascentwind.runners.present.wording import words
 
 ROOT = Path(__file__).parents[1]
 if not (ROOT / "pyproject.toml").is_file():

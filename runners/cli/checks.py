@@ -31,10 +31,8 @@ def verify(
 ) -> None:
     """The same statistics by independent engines, with a verdict; exit code 1 when they disagree."""
     from ..case.times import parse_times, spread_over
-    from ..present.style import write_figure
     from ..statistics.agreement import agreement
     from ..statistics.ensemble import Ensemble
-    from ..statistics.response_figures import sample_path_figure
 
     ensemble = Ensemble(runs=runs, seed=seed, paths=min(30, runs) if out else 0)
     study = load_study(vehicle, changes, [] if times else ["default_times"], turbulence=turbulence)
@@ -48,6 +46,9 @@ def verify(
     if found.resultants is not None:
         _print_resultants(found.resultants)
     if job:
+        from ..present.style import write_figure
+        from ..statistics.response_figures import sample_path_figure
+
         with on_terminal():
             start, last = study.system.start, max(end_times)
             at = [start + (last - start) * k / 60 for k in range(1, 61)]
@@ -63,7 +64,7 @@ def verify(
 
 
 def _print_agreement(found) -> None:
-    from ..present.style import display, words
+    from ..present.wording import display, words
     from ..statistics.agreement import REFERENCE
     from ..statistics.engines import ENGINES
 
@@ -91,7 +92,7 @@ def _print_agreement(found) -> None:
 
 
 def _print_resultants(found: ResultantAgreement) -> None:
-    from ..present.style import display, words
+    from ..present.wording import display, words
     from ..statistics.agreement import REFERENCE
     from ..statistics.engines import ENGINES
 

@@ -70,7 +70,8 @@ def flight_load(
     from ..flight_load.request import DESIGN, NoVarianceError, checked_draws
     from ..flight_load.uncertain_parameter import checked_spread
     from ..flight_load.window import checked_window
-    from ..present.style import words, write_figure
+    from ..present.style import write_figure
+    from ..present.wording import words
     from ..statistics.percentiles import checked_probabilities, checked_sides
     from ..statistics.resultants import response_or_resultant
 
@@ -167,7 +168,7 @@ def known_loads(study: Study, sides: str = "both") -> list[str]:
 
 def print_levels(loads: list[FlightLoad]) -> None:
     """Print the levels of flights beside those of their worst instants."""
-    from ..present.style import display, words
+    from ..present.wording import display, words
 
     begin, end = loads[0].window
     sides = {"both": "size", "upper": "upper side", "lower": "lower side"}[loads[0].sides]
@@ -191,7 +192,7 @@ def print_levels(loads: list[FlightLoad]) -> None:
 
 def print_wind_intervals(loads: list[FlightLoad]) -> None:
     """Print how well the wind's soundings know the levels, and how many simulated flights would say as much."""
-    from ..present.style import display, words
+    from ..present.wording import display, words
 
     samples = loads[0].wind_samples
     if samples is None:
@@ -225,7 +226,7 @@ def print_wind_intervals(loads: list[FlightLoad]) -> None:
 
 def _sensitivities(loads: list[FlightLoad]) -> list[xr.Dataset]:
     """Return derivatives of the first levels; where one fails say so, so that what is written stands."""
-    from ..present.style import words
+    from ..present.wording import words
 
     found = []
     with steps("derivatives of the levels", len(loads)) as bar:
@@ -241,7 +242,7 @@ def _sensitivities(loads: list[FlightLoad]) -> list[xr.Dataset]:
 
 def _print_uncertain(loads: list[FlightLoad], wind_error: float) -> None:
     """Print the levels of flights of which each has its own sigma of the wind."""
-    from ..present.style import display, words
+    from ..present.wording import display, words
 
     table = Table(
         "response", title=f"Levels with the wind's σ uncertain by {100 * wind_error:.3g} % from flight to flight"
@@ -262,7 +263,7 @@ def _print_uncertain(loads: list[FlightLoad], wind_error: float) -> None:
 
 def print_sensitivity(found: xr.Dataset) -> None:
     """Print the parameters that a level owes most to."""
-    from ..present.style import display, words
+    from ..present.wording import display, words
 
     a = found.attrs
     factor, unit = display(a["unit"], a["level"])
@@ -280,7 +281,7 @@ def print_sensitivity(found: xr.Dataset) -> None:
 
 def print_loads(loads: list[FlightLoad]) -> None:
     """Print levels, the shares of the sources, and what limits leave."""
-    from ..present.style import words
+    from ..present.wording import words
 
     print_levels(loads)
     print_wind_intervals(loads)
@@ -309,7 +310,7 @@ def print_passage(passage: Passage) -> None:
     table = Table("limit of", title="Limits passed most often")
     for column in ("chance", "least margin", "side", "at"):
         table.add_column(column, justify="right", no_wrap=True)
-    from ..present.style import display
+    from ..present.wording import display
 
     margin, times, mean = passage.margin.values, passage.margin["time"].values, passage.process.drawn.mean[passage.told]
     for r in sorted(range(chance.size), key=lambda r: -chance[r])[:SHOWN_LIMITS]:

@@ -45,7 +45,8 @@ def fly(
     from ..case.times import parse_times
     from ..measured_winds.files import write_flown
     from ..measured_winds.flown_figure import flown_figure
-    from ..present.style import words, write_figure
+    from ..present.style import write_figure
+    from ..present.wording import words
     from ..statistics.resultants import resultant_pairs
 
     if component is None:
@@ -88,7 +89,7 @@ def print_flown(flown: FlownWinds) -> None:
     """Print flight maxima of the profiles beside those of a Gaussian wind, and what non-normality does to 3 sigma."""
     import numpy as np
 
-    from ..present.style import display, words
+    from ..present.wording import display, words
     from ..statistics.resultants import resultant_pairs
 
     n = len(flown.values)

@@ -49,7 +49,8 @@ def gust(
     from ..gusts.files import write_gusts
     from ..gusts.shapes import LENGTHS
     from ..gusts.shapes import SHAPES as KNOWN
-    from ..present.style import words, write_figure
+    from ..present.style import write_figure
+    from ..present.wording import words
     from ..station_loads.loads_along_vehicle import known_loads
 
     for name in shape or ():
@@ -97,7 +98,7 @@ def print_gusts(sweeps: list[GustSweep], sheets: list[xr.Dataset]) -> None:
     """Print the worst gusts, and the sheet of combined loads."""
     import numpy as np
 
-    from ..present.style import display, words
+    from ..present.wording import display, words
 
     amplitude = sweeps[0].gust.amplitude
     table = Table("response", "shape", title=f"Worst gusts of {amplitude:g} m/s, the gust alone")

@@ -21,7 +21,8 @@ def mean(
     """The mean response in the mean wind by the nonlinear planar equations, beside the linear one."""
     import numpy as np
 
-    from ..present.style import words, write_figure
+    from ..present.style import write_figure
+    from ..present.wording import words
     from ..views.mean_comparison import mean_comparison, mean_comparison_figure
 
     study = load_study(vehicle, changes)

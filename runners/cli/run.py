@@ -83,7 +83,8 @@ def run(
     from ..flight_load.files import with_flight_levels
     from ..flight_load.request import DESIGN
     from ..present.files import write_text
-    from ..present.style import words, write_figure
+    from ..present.style import write_figure
+    from ..present.wording import words
     from ..statistics.engines import engine_from
     from ..statistics.larger_side import LABEL
     from ..statistics.norm import LIKE_3_SIGMA
@@ -335,7 +336,7 @@ def _flight_loads(study: Study, end_times: list[float], probabilities: tuple[flo
 
 
 def _print_peaks(statistics: ResponseStatistics) -> None:
-    from ..present.style import display, words
+    from ..present.wording import display, words
     from ..statistics.larger_side import LABEL
 
     found = statistics.peaks()
@@ -359,7 +360,7 @@ def _print_peaks(statistics: ResponseStatistics) -> None:
 
 
 def _print_instant_levels(statistics: ResponseStatistics, probability: float) -> None:
-    from ..present.style import display, words
+    from ..present.wording import display, words
 
     found = statistics.percentile(probability)
     table = Table("response", title=f"Passed with {probability:g} at an instant, in size")
@@ -375,7 +376,8 @@ def _print_instant_levels(statistics: ResponseStatistics, probability: float) ->
 
 
 def _resultant_figures(both: Resultants, title: str, folder: Path) -> list[Path]:
-    from ..present.style import words, write_figure
+    from ..present.style import write_figure
+    from ..present.wording import words
     from ..statistics.resultant_figures import direction_figure, history_figure
 
     written = []
@@ -391,7 +393,8 @@ def _write_azimuths(
 ) -> list[Path]:
     """Write and print the resultants by azimuth."""
     from ..present.files import write_text
-    from ..present.style import display, words, write_figure
+    from ..present.style import write_figure
+    from ..present.wording import display, words
     from ..views.azimuth_sweep import AZIMUTH, azimuth_csv, azimuth_figure, azimuth_sweep
 
     found = azimuth_sweep(study, azimuths, end_times)
@@ -412,7 +415,7 @@ def _write_azimuths(
 
 
 def _print_resultants(both: Resultants) -> None:
-    from ..present.style import display, words
+    from ..present.wording import display, words
 
     for chance in (float(p) for p in both.dataset["probability"].values):
         table = Table("resultant", title=f"Resultants of pitch and yaw, passed with {chance:.3g} at an instant")
@@ -432,7 +435,7 @@ def _print_resultants(both: Resultants) -> None:
 
 
 def _print_along(found: list[LargestAlong]) -> None:
-    from ..present.style import display, words
+    from ..present.wording import display, words
     from ..statistics.larger_side import LABEL
 
     table = Table("load", title=f"Largest {LABEL} along the vehicle")

@@ -49,7 +49,8 @@ def run_system(
     from ...model.files.toml_file import read_toml
     from ...model.system.system_file import SystemFile, system_of
     from ..case.times import parse_times
-    from ..present.style import words, write_figure
+    from ..present.style import write_figure
+    from ..present.wording import words
     from ..statistics.larger_side import LABEL
     from ..study import Study
 
@@ -81,7 +82,7 @@ def run_system(
 
 
 def _print_peaks(statistics: ResponseStatistics) -> None:
-    from ..present.style import words
+    from ..present.wording import words
     from ..statistics.larger_side import LABEL
 
     table = Table("response", title=f"Peaks of {LABEL}")

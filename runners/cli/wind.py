@@ -434,7 +434,7 @@ def compare(
 
     from ...model.wind.range_reference import shipped_statistics
     from ..case.times import time_of_greatest_dynamic_pressure
-    from ..present.style import display, words
+    from ..present.wording import display, words
     from ..views.wind_comparison import (
         REPORT_ERRORS,
         TOP,

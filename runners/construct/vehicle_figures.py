@@ -8,7 +8,8 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 
-from ..present.style import STYLE, Figure, display, words
+from ..present.style import STYLE, Figure
+from ..present.wording import display, words
 from .vehicle_numbers import VehicleNumbers
 
 

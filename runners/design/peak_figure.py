@@ -6,7 +6,8 @@ import numpy as np
 from matplotlib import rc_context
 
 from ...model.errors import IntegrationError
-from ..present.style import COLORS, STYLE, Figure, display, words, wrapped
+from ..present.style import COLORS, STYLE, Figure, wrapped
+from ..present.wording import display, words
 from ..statistics.resultants import labels_of, outputs_of
 from .design import DesignResult
 from .peaks import three_sigma

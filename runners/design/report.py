@@ -11,8 +11,9 @@ from rich.console import Console
 from rich.table import Table
 
 from ..present.files import write_text
-from ..present.style import display, words, write_figure
+from ..present.style import write_figure
 from ..present.terminal import print_table
+from ..present.wording import display, words
 from ..statistics.resultants import outputs_of
 from .design import DesignResult, RecomputedPeak, TradePoint
 from .trade_figure import trade_figure

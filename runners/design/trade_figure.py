@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 
 from matplotlib import rc_context
 
-from ..present.style import SHADES, STYLE, Figure, display, words
+from ..present.style import SHADES, STYLE, Figure
+from ..present.wording import display, words
 from ..statistics.resultants import labels_of, outputs_of
 from .design import TradePoint
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from matplotlib import rc_context
 
-from ..present.style import COLORS, STYLE, Figure, display, words, wrapped
+from ..present.style import COLORS, STYLE, Figure, wrapped
+from ..present.wording import display, words
 from .design_wind import DesignWind
 
 

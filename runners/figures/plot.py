@@ -32,7 +32,8 @@ from ..parameter_study.grid_figure import grid_figure
 from ..parameter_study.measures import measures
 from ..parameter_study.run import ParameterStudy
 from ..parameter_study.spread import spread
-from ..present.style import Figure, words
+from ..present.style import Figure
+from ..present.wording import words
 from ..sensitivity.derivative_figures import tornado_figure as elasticity_figure
 from ..statistics.response_figures import weighting_figure
 from ..statistics.resultant_figures import history_figure

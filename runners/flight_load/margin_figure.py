@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from matplotlib import rc_context
 
-from ..present.style import COLORS, STYLE, Figure, display, words, wrapped
+from ..present.style import COLORS, STYLE, Figure, wrapped
+from ..present.wording import display, words
 from .load import FlightLoad
 
 

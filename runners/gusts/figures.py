@@ -8,7 +8,8 @@ import numpy as np
 import xarray as xr
 from matplotlib import rc_context
 
-from ..present.style import COLORS, SHADES, STYLE, Figure, display, words, wrapped
+from ..present.style import COLORS, SHADES, STYLE, Figure, wrapped
+from ..present.wording import display, words
 from .search import GustSweep, WorstGust
 
 MARGIN = 1.08  # above the largest, for its dot

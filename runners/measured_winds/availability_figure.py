@@ -8,7 +8,8 @@ from matplotlib import colormaps, rc_context
 from matplotlib.colors import LogNorm
 from matplotlib.projections.polar import PolarAxes
 
-from ..present.style import STYLE, Figure, display, words, wrapped
+from ..present.style import STYLE, Figure, wrapped
+from ..present.wording import display, words
 
 LEAST = 1e-6  # of the colours
 MOST_OF_SECTOR, EDGE = 120.0, 10.0  # deg of azimuths drawn as a sector, and beside them

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from matplotlib import rc_context
 
-from ..present.style import COLORS, SHADES, STYLE, Figure, display, words, wrapped
+from ..present.style import COLORS, SHADES, STYLE, Figure, wrapped
+from ..present.wording import display, words
 from .flown_resultants import FlownResultants
 from .fly import FlownWinds
 from .profile_statistics import number_of

@@ -8,7 +8,8 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from ..flight_load.passage import LimitedLoad
-from ..present.style import COLORS, SHADES, STYLE, Figure, display, words, wrapped
+from ..present.style import COLORS, SHADES, STYLE, Figure, wrapped
+from ..present.wording import display, words
 from .day_of_launch import BAND, DayOfLaunch
 from .limited_loads import Limit
 from .persistence import EXPONENTS

@@ -10,7 +10,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ...model.system.names import COMBINED
-from ..present.style import display, words
+from ..present.wording import display, words
 from ..statistics.larger_side import LABEL, LARGER_SIDE, larger_side, side
 from ..statistics.norm import NormOfNormal
 from .run import ParameterStudy

@@ -7,8 +7,8 @@ import xarray as xr
 from rich.console import Console
 from rich.table import Table
 
-from ..present.style import words
 from ..present.terminal import print_whole
+from ..present.wording import words
 from .compute import COMPUTED, FAILED, STATUS, UNSTABLE
 from .measures import LABELS, PEAK, displayed, label, nominal_side, timed
 from .run import ParameterStudy

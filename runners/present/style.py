@@ -7,7 +7,6 @@ from pathlib import Path
 from textwrap import wrap
 from typing import Any
 
-import numpy as np
 from matplotlib import figure as matplotlib_figure
 from matplotlib import rc_context
 from matplotlib.axis import Axis, Tick
@@ -15,22 +14,10 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.text import Text
 from matplotlib.ticker import FixedFormatter, FuncFormatter
-from numpy.typing import ArrayLike
 
 from ...model.system.names import COMBINED, file_name
 from .files import write_whole
 
-# what people read: factor from SI, unit
-DISPLAY = {
-    "rad": (180 / np.pi, "deg"),
-    "m": (1.0, "m"),
-    "m/s": (1.0, "m/s"),
-    "Pa rad": (1e-3 * 180 / np.pi, "kPa deg"),
-    "1": (1.0, "1"),
-}
-NEWTONS = ("N", "N m", "N m/rad")
-PREFIXES = ((1e6, "M"), (1e3, "k"), (1.0, ""))  # of newtons: the first that leaves the largest value at 1 or more
-BRITISH = {"center": "centre", "generalized": "generalised"}  # names are American, prose is not
 PIXELS = 150  # an inch, of PNG files
 TITLE_WIDTH = 76  # characters across a figure of 8 inches
 STYLE: dict[Any, Any] = {
@@ -59,15 +46,6 @@ class Figure(matplotlib_figure.Figure):
         return image.getvalue()
 
 
-def display(unit: str, values: ArrayLike) -> tuple[float, str]:
-    """Return the factor from SI and the unit in which values of a response are shown."""
-    if unit in NEWTONS:
-        largest = float(np.nanmax(np.abs(values)))
-        size, prefix = next((p for p in PREFIXES if largest >= p[0]), PREFIXES[0])
-        return 1 / size, prefix + unit
-    return DISPLAY.get(unit, (1.0, unit))
-
-
 def wrapped(title: str) -> str:
     """Return a title with its long lines broken, so that they stay on the figure, into parts of nearly equal length."""
     return "\n".join("\n".join(_parts(line)) for line in title.splitlines())
@@ -77,14 +55,6 @@ def _parts(line: str) -> list[str]:
     longest = wrap(line, TITLE_WIDTH)
     widths = range(max(map(len, line.split()), default=1), TITLE_WIDTH)
     return next((parts for width in widths if len(parts := wrap(line, width)) == len(longest)), longest)
-
-
-def words(name: str) -> str:
-    """Return a name as words of prose, which is British: 'center_of_pressure' becomes 'centre of pressure'."""
-    found = name.replace("_", " ")
-    for american, british in BRITISH.items():
-        found = found.replace(american, british)
-    return found
 
 
 def write_figure(figure: matplotlib_figure.Figure, folder: Path, name: str) -> list[Path]:

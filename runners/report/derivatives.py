@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from ..present.style import words
+from ..present.wording import words
 from ..sensitivity.derivative_figures import heading, largest
 from .figures import bars
 from .parts import Key, Part, Table, Text

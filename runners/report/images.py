@@ -9,7 +9,7 @@ from pathlib import Path
 from PIL import Image as Picture
 
 from ...model.errors import DataError
-from ..present.style import words
+from ..present.wording import words
 from .parts import Image
 
 WIDTH = 1000  # px

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from ..present.style import display, words
+from ..present.wording import display, words
 from .figures import curve_ink, lines
 from .parts import Figure, Key, Part, Table, Text
 

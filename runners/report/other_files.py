@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ...model.errors import DataError
 from ...model.files.text_file import read_text
-from ..present.style import words
+from ..present.wording import words
 from .figures import curve_ink, lines
 from .images import images
 from .parts import Figure, Key, Markup, Part, Section, Table, Text

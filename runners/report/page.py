@@ -13,7 +13,7 @@ from jinja2 import Environment, PackageLoader
 from markupsafe import Markup as Safe
 
 from ...model.errors import DataError
-from ..present.style import words
+from ..present.wording import words
 from ..statistics.files import NAME as STATISTICS
 from ..statistics.results import ResponseStatistics
 from . import derivatives, loads, origin, other_files, responses

@@ -9,7 +9,7 @@ import xarray as xr
 
 from ...model.system.names import COMBINED
 from ..present.netcdf import RULE
-from ..present.style import display, words
+from ..present.wording import display, words
 from ..statistics.larger_side import LABEL, SIGMAS, sign
 from ..statistics.peaks import Peak
 from ..statistics.results import ResponseStatistics

@@ -9,7 +9,8 @@ import numpy as np
 from matplotlib import rc_context
 
 from ...model.wind.range_reference import shipped_statistics
-from ..present.style import STYLE, Figure, display
+from ..present.style import STYLE, Figure
+from ..present.wording import display
 from ..statistics.larger_side import SIGMAS, side, sign
 from ..statistics.results import ResponseStatistics
 from ..study import Study

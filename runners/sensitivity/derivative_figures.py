@@ -8,7 +8,8 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 
 from ...model.system.names import COMBINED
-from ..present.style import COLORS, SHADES, STYLE, Figure, display, words
+from ..present.style import COLORS, SHADES, STYLE, Figure
+from ..present.wording import display, words
 from ..statistics.larger_side import LABEL, LARGER_SIDE, side
 
 BARS = 14

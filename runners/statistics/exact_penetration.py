@@ -36,7 +36,7 @@ from ..case.provenance import provenance
 from ..case.wind_start import covariance_at
 from ..present.netcdf import RULE
 from ..present.progress import steps
-from ..present.style import words
+from ..present.wording import words
 from ..solvers.adjoint import AdjointHistory, AdjointSolver
 from ..solvers.time_nodes import intervals, time_nodes
 from .cvodes import Cvodes

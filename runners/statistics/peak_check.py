@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..present.netcdf import RULE
 from ..present.progress import steps
-from ..present.style import display, words
+from ..present.wording import display, words
 from ..solvers.adjoint import AdjointHistory, AdjointSolver
 from ..solvers.covariance import covariance_equation
 from ..solvers.ensemble import std_interval

@@ -15,7 +15,7 @@ from ...model.vehicle.planes import PLANES
 from ..case.case import Case
 from ..present.netcdf import RULE
 from ..present.progress import steps
-from ..present.style import display, words
+from ..present.wording import display, words
 from ..solvers.adjoint import AdjointSolver
 from .cvodes import Cvodes
 from .norm import NormOfNormal

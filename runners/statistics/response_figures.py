@@ -9,7 +9,8 @@ import xarray as xr
 from matplotlib import rc_context
 
 from ...model.system.names import COMBINED
-from ..present.style import COLORS, STYLE, Figure, display, words, wrapped
+from ..present.style import COLORS, STYLE, Figure, wrapped
+from ..present.wording import display, words
 from .larger_side import LABEL, SIGMAS, side, sign
 from .peaks import peaks
 

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from ...model.system.names import COMBINED
 from ...model.vehicle.planes import PLANES
-from ..present.style import COLORS, SHADES, STYLE, Figure, display, words, wrapped
+from ..present.style import COLORS, SHADES, STYLE, Figure, wrapped
+from ..present.wording import display, words
 from .larger_side import SIGMAS
 from .norm import NormOfNormal
 from .resultants import ResultantPeak, Resultants

@@ -21,7 +21,8 @@ from ...model.system.names import COMBINED
 from ...model.vehicle.vehicle import Vehicle
 from ..present.files import write_text
 from ..present.netcdf import write_netcdf
-from ..present.style import COLORS, STYLE, Figure, display, words, write_figure
+from ..present.style import COLORS, STYLE, Figure, write_figure
+from ..present.wording import display, words
 from ..station_loads.loads_along_vehicle import LOADS, every_load_along_vehicle, known_loads
 from ..statistics.larger_side import LABEL, larger_side, side
 

@@ -11,7 +11,8 @@ from matplotlib import rc_context
 from ...model.errors import ParameterValueError, PlanesError
 from ..case.case import Case
 from ..case.provenance import provenance
-from ..present.style import COLORS, STYLE, Figure, display, words, wrapped
+from ..present.style import COLORS, STYLE, Figure, wrapped
+from ..present.wording import display, words
 from ..statistics.engines import response_statistics
 from ..statistics.norm import LIKE_3_SIGMA
 

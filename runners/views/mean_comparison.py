@@ -12,7 +12,8 @@ from ...model.vehicle.planes import require_yaw
 from ..case.case import Case
 from ..case.provenance import provenance
 from ..present.progress import steps
-from ..present.style import STYLE, Figure, words
+from ..present.style import STYLE, Figure
+from ..present.wording import words
 from ..solvers.planar_mean import RESPONSES, planar_mean
 
 MODELS = ("linear", "linear_rigid", "nonlinear_rigid")

@@ -13,7 +13,8 @@ from ...model.system.names import COMBINED
 from ...model.vehicle.loads import BENDING_MOMENT, SHEAR_FORCE
 from ..case.case import Case
 from ..present.files import write_text
-from ..present.style import COLORS, SHADES, STYLE, Figure, display, words, wrapped, write_figure
+from ..present.style import COLORS, SHADES, STYLE, Figure, wrapped, write_figure
+from ..present.wording import display, words
 from ..station_loads.loads_along_vehicle import known_loads, resultant_along_vehicle
 from ..statistics.larger_side import SIGMAS
 

@@ -19,7 +19,7 @@ from ascentwind.runners.case.times import parse_times, spread_over, time_of_grea
 from ascentwind.runners.cli.new_vehicle import copy_vehicle
 from ascentwind.runners.construct.ascent.mean_flight import MeanFlight, fly
 from ascentwind.runners.construct.build_vehicle import build_vehicle
-from ascentwind.runners.present.style import display
+from ascentwind.runners.present.wording import display
 from ascentwind.runners.solvers.covariance import covariance_equation
 
 FOLDER = built_in_vehicles()["falcon1"]
