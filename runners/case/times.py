@@ -74,7 +74,7 @@ def spread_over(times: Sequence[float], count: int) -> list[float]:
     return [times[i] for i in np.unique(np.linspace(0, len(times) - 1, count).round().astype(int))]
 
 
-def drawn_times(times: Sequence[float], stops: Iterable[float]) -> list[float]:
+def drawn_times(times: Sequence[float], stops: Iterable[float], count: int = DRAWN) -> list[float]:
     """Return times at which curves are drawn: the end times, others between them, and both sides of every stop.
 
     Parameters
@@ -83,14 +83,16 @@ def drawn_times(times: Sequence[float], stops: Iterable[float]) -> list[float]:
         End times, s.
     stops : iterable of float
         Where coefficients jump or have a corner, s.
+    count : int
+        Of times that the curve has at least.
     """
     first, last = times[0], times[-1]
     if last <= first:
         return list(times)
     after = AFTER * (last - first)
     own = np.array(sorted({*times, *(t for s in stops if first < s < last - after for t in (s, s + after))}))
-    between = np.linspace(first, last, DRAWN)
-    apart = np.abs(between[:, None] - own).min(axis=1) > 0.1 * (last - first) / DRAWN
+    between = np.linspace(first, last, count)
+    apart = np.abs(between[:, None] - own).min(axis=1) > 0.1 * (last - first) / count
     return np.union1d(own, between[apart]).tolist()
 
 

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 TOP = 30000.0  # m
 FEW = 3  # azimuths, whose intervals are printed
 MOST_ROSES = 6  # of the largest loads
+FEWEST_OF_A_ROSE = 2  # azimuths
 
 
 def availability(
@@ -105,7 +106,8 @@ def availability(
     heading = f"{title}\n{planes.capitalize()}: the months' winds of {found.attrs['site']}, not the vehicle's own"
     job.written += write_figure(availability_figure(found, heading), job.folder, "availability")
     worst = found["level"].max(dim=("month", "azimuth")).values
-    for name in found["response"].values[np.argsort(-worst, kind="stable")[:MOST_ROSES]]:
+    around = found["azimuth"].size >= FEWEST_OF_A_ROSE
+    for name in found["response"].values[np.argsort(-worst, kind="stable")[: MOST_ROSES if around else 0]]:
         job.written += write_figure(load_rose(found, str(name), heading), job.folder, f"rose_{name}")
     table = Table("month", title=f"Flights that pass a limit, {planes}, winds of {found.attrs['site']}")
     shown = found["azimuth"].values

@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     from ..study import Study
     from ..views.along_vehicle_files import LargestAlong
 
+RESULTANTS_DRAWN = 100  # times of a curve, of which each costs as much as a percentile
+
 
 def run(
     vehicle: OptionalVehicle = None,
@@ -79,7 +81,7 @@ def run(
         checked_libraries()
     from ...model.equations.stated_twice import compare_stated_twice
     from ...model.vehicle.planes import BOTH
-    from ..case.times import parse_times
+    from ..case.times import DRAWN, parse_times
     from ..flight_load.files import with_flight_levels
     from ..flight_load.request import DESIGN
     from ..present.files import write_text
@@ -158,11 +160,13 @@ def run(
             statistics.save(job.folder)
     with steps("figures", len(study.system.outputs) + 2) as bar:
         if both is not None:
-            job.written += _resultant_figures(both, flown.title, job.folder)
-        drawn = _drawn(study, statistics, end_times, chosen)
+            finer = _drawn(study, statistics, end_times, chosen, RESULTANTS_DRAWN)
+            smooth = None if finer is None else finer.resultants((LIKE_3_SIGMA,))
+            job.written += _resultant_figures(both, smooth, flown.title, job.folder)
+        drawn = _drawn(study, statistics, end_times, chosen, DRAWN)
         for output in study.system.outputs:
             title = f"{flown.title}\n{words(output.name).capitalize()}, mean and {LABEL}"
-            figure = response_figure(statistics.dataset, output.name, title, drawn)
+            figure = response_figure(statistics.dataset, output.name, title, None if drawn is None else drawn.dataset)
             job.written += write_figure(figure, job.folder, output.name)
             bar.done()
         weighting = _weighting(study, statistics, check, families)
@@ -226,16 +230,16 @@ def run(
 
 
 def _drawn(
-    study: Study, statistics: ResponseStatistics, end_times: list[float], engine: Engine | None
-) -> xr.Dataset | None:
+    study: Study, statistics: ResponseStatistics, end_times: list[float], engine: Engine | None, count: int
+) -> ResponseStatistics | None:
     """Return the statistics at more times, where the engine takes them all in one pass; None elsewhere."""
     from ..case.times import drawn_times
     from ..statistics.sweep import Sweep
 
     if statistics.attrs["engine"] != Sweep.name:
         return None
-    times = drawn_times(end_times, study.executable.stops(end_times[-1]).times)
-    return study.response_statistics(times, engine=engine).dataset
+    times = drawn_times(end_times, study.executable.stops(end_times[-1]).times, count)
+    return study.response_statistics(times, engine=engine)
 
 
 def _weighting(
@@ -375,7 +379,7 @@ def _print_instant_levels(statistics: ResponseStatistics, probability: float) ->
     print_table(table, console)
 
 
-def _resultant_figures(both: Resultants, title: str, folder: Path) -> list[Path]:
+def _resultant_figures(both: Resultants, smooth: Resultants | None, title: str, folder: Path) -> list[Path]:
     from ..present.style import write_figure
     from ..present.wording import words
     from ..statistics.resultant_figures import direction_figure, history_figure
@@ -383,7 +387,7 @@ def _resultant_figures(both: Resultants, title: str, folder: Path) -> list[Path]
     written = []
     for name in (str(name) for name in both.dataset["resultant"].values):
         head = f"{title}\n{words(name).capitalize()}"
-        written += write_figure(history_figure(both, name, head), folder, name)
+        written += write_figure(history_figure(both, name, head, smooth), folder, name)
         written += write_figure(direction_figure(both, name, head), folder, f"{name}_by_direction")
     return written
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from matplotlib import rc_context
 
-from ..present.style import SHADES, STYLE, Figure
+from ..present.style import SHADES, STYLE, Figure, wrapped
 from ..present.wording import display, words
 from ..statistics.resultants import labels_of, outputs_of
 from .design import TradePoint
@@ -38,14 +38,14 @@ def trade_figure(trades: Mapping[str, Sequence[TradePoint]], response: str, titl
                 axes.plot([along * p.limit for p in met], heights, "o-", color=color, lw=2, ms=5, label=variant)
         axes.plot(
             along * before[f"peak {response}"], up * before[f"peak {first.problem.response}"],
-            "*", color="black", ms=13, ls="none", label="start",
+            "*", color="black", ms=13, ls="none", label="before the design",
         )  # fmt: skip
         below, beside = (
             f"{'level of' if len(outputs_of(first.problem.study, name)) == 2 else '|mean| + 3σ'} {words(name)}"
             for name in (response, first.problem.response)
         )
-        axes.set_xlabel(f"limit on the peak of {below}, {along_unit}")
-        axes.set_ylabel(f"lowest peak of {beside}, {up_unit}")
+        axes.set_xlabel(f"limit on the peak of {below} ({along_unit})")
+        axes.set_ylabel(f"lowest peak of {beside} ({up_unit})")
         axes.legend()
-        axes.set_title(title, loc="left")
+        axes.set_title(wrapped(title))
     return figure

@@ -40,15 +40,18 @@ def gust_figure(sweeps: Sequence[GustSweep], responses: Sequence[xr.Dataset], na
         for sweep, each, over_time, color in zip(sweeps, worst, responses, SHADES, strict=False):
             of_time = sweep.dataset["largest"].sel(response=name)
             largest = factor * abs(of_time).max("time")
-            above.plot(sweep.lengths, largest, color=color, lw=2, label=words(sweep.gust.name))
+            above.plot(sweep.lengths, largest, color=color, lw=1.4, marker=".", ms=5, label=words(sweep.gust.name))
             above.plot(each.gust.length, factor * abs(each.value), "o", color=color)
             values = over_time["response_to_gust"].sel(response=name)
             label = f"{each.gust.length:.0f} m from {each.start_altitude / 1000:.2f} km"
             below.plot(over_time["time"] - each.time_met, factor * values, color=color, lw=1.8, label=label)
         amplitude = abs(sweeps[0].gust.amplitude)
         top = MARGIN * max(factor * abs(each.value) for each in worst)
-        above.set(xlabel="length of the gust (m)", ylabel=f"|{words(name)}| ({unit})", ylim=(0, top))
-        above.set_title("largest of all altitudes and times; dots: located between them", fontsize=10)
+        size = f"|{words(name)}|" if worst[0].direction is None else words(name)  # which is a size already
+        above.set(xlabel="length of the gust (m)", ylabel=f"{size} ({unit})", ylim=(0, top))
+        above.set_title(
+            "largest of all altitudes and times; large dots: located between them and between lengths", fontsize=10
+        )
         above.legend()
         below.axhline(0.0, color=COLORS["mean"], lw=0.8)
         below.set(xlabel="time since the vehicle met the gust (s)", ylabel=f"{words(name)} ({unit})")
@@ -78,10 +81,14 @@ def along_vehicle_figure(found: Sequence[xr.Dataset], worst: Sequence[WorstGust]
         axes = figure.subplots()
         for each, gust, color in zip(found, worst, SHADES, strict=False):
             label = f"{words(gust.gust.name)}, t = {gust.time:.1f} s"
-            axes.plot(each["station"], factor * each["envelope"], color=color, lw=2, label=f"largest, {label}")
+            axes.plot(
+                each["station"], factor * each["envelope"], color=color, lw=2, marker=".", label=f"largest, {label}"
+            )
             size = factor * np.abs(each["in_worst_gust"])
             axes.plot(each["station"], size, "--", color=color, lw=1.4, label=f"in the worst one, {label}")
         load = words(str(found[0].attrs["load"]))
-        axes.set(xlabel="vehicle station (m)", ylabel=f"|{load}| ({unit})", ylim=(0, None), title=wrapped(title))
+        # in both planes each gust blows where it does most harm, and what it makes is a size already
+        load = f"|{load}|" if worst[0].direction is None else f"resultant {load}"
+        axes.set(xlabel="vehicle station (m)", ylabel=f"{load} ({unit})", ylim=(0, None), title=wrapped(title))
         axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=2)
     return figure

@@ -13,6 +13,8 @@ from ..present.wording import display, words
 
 LEAST = 1e-6  # of the colours
 MOST_OF_SECTOR, EDGE = 120.0, 10.0  # deg of azimuths drawn as a sector, and beside them
+NARROWEST, LOWEST = 8.0, 3.2  # in, of a figure whose title and colour bar have room
+ROUNDING = 1e-9  # rad
 
 
 def availability_figure(found: xr.Dataset, title: str) -> Figure:
@@ -31,12 +33,14 @@ def availability_figure(found: xr.Dataset, title: str) -> Figure:
     p = np.maximum(found["probability"].values, LEAST)
     months, angles = [str(m).capitalize() for m in found["month"].values], np.degrees(found["azimuth"].values)
     with rc_context({**STYLE, "axes.grid": False}):
-        figure = Figure(figsize=(2.5 + 0.75 * max(angles.size, 4), 1.8 + 0.42 * len(months)), layout="constrained")
+        size = max(NARROWEST, 2.5 + 0.75 * angles.size), max(LOWEST, 1.8 + 0.42 * len(months))
+        figure = Figure(figsize=size, layout="constrained")
         axes = figure.subplots()
         image = axes.imshow(p, aspect="auto", cmap="YlOrRd", norm=LogNorm(min(p.min(), 1e-4), max(p.max(), 1e-2)))
         for i, j in np.ndindex(*p.shape):
             shade = float(np.asarray(image.norm(p[i, j])))
-            axes.text(j, i, f"{found['probability'].values[i, j]:.2g}", ha="center", va="center", fontsize=8,
+            value = found["probability"].values[i, j]
+            axes.text(j, i, f"{value:.2g}" if value >= LEAST else f"< {LEAST:g}", ha="center", va="center", fontsize=8,
                       color="white" if shade > 0.65 else "black")  # fmt: skip
         axes.set_xticks(range(angles.size), [f"{a:.4g}" for a in angles])
         axes.set_yticks(range(len(months)), months)
@@ -70,8 +74,11 @@ def load_rose(found: xr.Dataset, response: str, title: str) -> Figure:
         assert isinstance(axes, PolarAxes)
         axes.set_theta_zero_location("N")
         axes.set_theta_direction(-1)
+        steps = np.diff(angles)
+        whole = steps.size > 1 and 0 < angles[0] + 2 * np.pi - angles[-1] <= steps.max() + ROUNDING
+        closed = [*range(angles.size), *([0] if whole else [])]  # a line from the last azimuth to the first
         for row, month, color in zip(values, months, colors, strict=True):
-            axes.plot(angles, factor * row, "o-", ms=3, lw=1.4, color=color, label=month)
+            axes.plot(angles[closed], factor * row[closed], "o-", ms=3, lw=1.4, color=color, label=month)
         axes.set_rlim(0)
         first, last = np.degrees(angles.min()), np.degrees(angles.max())
         if 0 < last - first <= MOST_OF_SECTOR:  # the rest of the compass is empty

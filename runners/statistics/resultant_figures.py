@@ -23,9 +23,17 @@ AROUND = np.linspace(0.0, 2.0 * np.pi, 361)
 HEADROOM = 1.2  # of the axes beyond what is drawn
 
 
-def history_figure(resultants: Resultants, resultant: str, title: str) -> Figure:
-    """Return the level of a resultant over time, beside |mean| + 3 sigma of each plane."""
-    data, chance = resultants.dataset.sel(resultant=resultant), _chance(resultants)
+def history_figure(resultants: Resultants, resultant: str, title: str, drawn: Resultants | None = None) -> Figure:
+    """Return the level of a resultant over time, beside |mean| + 3 sigma of each plane.
+
+    Parameters
+    ----------
+    resultants : Resultants
+    resultant, title : str
+    drawn : Resultants, optional
+        At times close enough for smooth curves; the same without it.
+    """
+    data, chance = (drawn or resultants).dataset.sel(resultant=resultant), _chance(resultants)
     peak = _peak(resultants, resultant)
     factor, unit = display(peak.unit, peak.value)
     time, level = data["time"].values, data["level"].sel(source=COMBINED, probability=chance).values
@@ -51,7 +59,7 @@ def history_figure(resultants: Resultants, resultant: str, title: str) -> Figure
         axes.margins(y=0.12)
         axes.set_ylim(bottom=0)
         axes.set(xlabel="flight time (s)", ylabel=f"{words(resultant)} ({unit})", title=wrapped(title))
-        axes.legend()
+        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=2)
     return figure
 
 

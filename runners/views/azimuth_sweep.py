@@ -5,18 +5,21 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
+import numpy as np
 import xarray as xr
 from matplotlib import rc_context
 
 from ...model.errors import ParameterValueError, PlanesError
 from ..case.case import Case
 from ..case.provenance import provenance
+from ..present.progress import each
 from ..present.style import COLORS, STYLE, Figure, wrapped
 from ..present.wording import display, words
 from ..statistics.engines import response_statistics
 from ..statistics.norm import LIKE_3_SIGMA
 
 AZIMUTH = "wind.azimuth"
+ROUNDING = 1e-9  # deg
 
 
 def checked_azimuths(azimuths: Iterable[float]) -> list[float]:
@@ -77,7 +80,7 @@ def azimuth_sweep(
     asked, ends = checked_azimuths(azimuths), list(times)
     check_turns(case)
     rows = []
-    for azimuth in asked:
+    for azimuth in each(asked, "azimuths"):
         turned = case.with_parameters({AZIMUTH: math.radians(azimuth)})
         rows.append(response_statistics(turned, ends).resultants([probability]).peaks())
     names = [peak.resultant for peak in rows[0]]
@@ -109,13 +112,17 @@ def azimuth_csv(found: xr.Dataset) -> str:
 
 
 def azimuth_figure(found: xr.Dataset, resultant: str, flown: float, title: str) -> Figure:
-    """Return the peak of a resultant over the azimuth (deg), that of the flight marked."""
+    """Return the peak of a resultant over the azimuth (deg), that of the flight marked; dots are what was computed."""
     part = found.sel(resultant=resultant).sortby("azimuth")
     factor, unit = display(str(part["unit"].item()), part["level"].values)
+    azimuth, level = part["azimuth"].values, factor * part["level"].values
+    if azimuth.size > 2 and 0 < azimuth[0] + 360 - azimuth[-1] <= np.diff(azimuth).max() + ROUNDING:  # a whole circle
+        azimuth, level = np.append(azimuth, azimuth[0] + 360), np.append(level, level[0])
     with rc_context(STYLE):
         figure = Figure(layout="constrained")
         axes = figure.subplots()
-        axes.plot(part["azimuth"], factor * part["level"], color=COLORS["combined"], lw=2, marker="o", ms=3)
+        axes.plot(azimuth, level, color=COLORS["combined"], lw=0.8, ls=":")
+        axes.plot(azimuth, level, color=COLORS["combined"], lw=0, marker="o", ms=5)
         axes.axvline(flown, color=COLORS["mean"], lw=1, ls="--")
         axes.margins(y=0.14)
         axes.annotate(

@@ -135,5 +135,5 @@ def test_figures_of_a_run_are_drawn_finely_where_that_costs_nothing(cache, engin
 
     study = lag()
     statistics = study.response_statistics([1.0, 4.0], engine=engine)
-    drawn = _drawn(study, statistics, [1.0, 4.0], None)
-    assert (drawn is not None and drawn.sizes["time"] > 100) == fine
+    drawn = _drawn(study, statistics, [1.0, 4.0], None, 400)
+    assert (drawn is not None and drawn.dataset.sizes["time"] > 100) == fine

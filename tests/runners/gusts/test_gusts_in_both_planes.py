@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
+import xarray as xr
 from planes import EACH, HORIZONTAL, in_both, in_one
 from scipy.stats import norm
 
@@ -14,6 +16,7 @@ from ascentwind.runners.case.climb import Climb
 from ascentwind.runners.gusts.along_vehicle import gust_along_vehicle
 from ascentwind.runners.gusts.clocking import largest, towards, worst_direction
 from ascentwind.runners.gusts.combined import combined_loads, inside_gust
+from ascentwind.runners.gusts.figures import along_vehicle_figure, gust_figure
 from ascentwind.runners.gusts.files import write_gusts
 from ascentwind.runners.gusts.response import gust_products
 from ascentwind.runners.gusts.weights import wind_weights
@@ -133,3 +136,18 @@ def test_along_the_vehicle_the_resultant(both, sweep):
     found = gust_along_vehicle(sweep, worst, slosh_reaction=False)
     assert np.interp(25.0, found["station"], found["in_worst_gust"]) == pytest.approx(worst.value, rel=2e-3)
     assert (found["envelope"].values >= found["in_worst_gust"].values).all()
+
+
+def test_figures_say_that_it_is_the_resultant(sweep):
+    worst = sweep.worst("resultant_bending_moment")
+    along = xr.Dataset(
+        {"envelope": ("station", [1e6, 2e6], {"units": "N m"}), "in_worst_gust": ("station", [1e6, 1e6])},
+        {"station": [0.0, 10.0]},
+        {"load": "bending_moment"},
+    )
+    assert along_vehicle_figure([along], [worst], "title").axes[0].get_ylabel() == "resultant bending moment (MN m)"
+    in_one = replace(worst, direction=None)
+    assert along_vehicle_figure([along], [in_one], "title").axes[0].get_ylabel() == "|bending moment| (MN m)"
+    over_time = sweep.over_time("resultant_bending_moment")
+    above = gust_figure([sweep], [over_time], "resultant_bending_moment", "title").axes[0]
+    assert above.get_ylabel() == "resultant bending moment (MN m)"

@@ -130,7 +130,14 @@ def made_up(as504) -> Reproduction:
     predictions = [Prediction(BY_NAME["peak_mean"], 10e6), Prediction(BY_NAME["rise_attack"], 0.005)]
     forms: dict[str, Responses] = dict.fromkeys(NOISE_LOADS, here)
     wind = MeanWind(1.5, 3.38, 10500.0, forms, forms, WindRatio("March 1983", 2.5, 37.0), WindRatio("May", 2.6, 38.0))
-    return Reproduction(predictions, effects, WindComparison({"own": statistics}, -0.07), [check], calibration, wind)
+    return Reproduction(
+        predictions,
+        effects,
+        WindComparison({"own": statistics}, -0.07, {"own": statistics}),
+        [check],
+        calibration,
+        wind,
+    )
 
 
 def test_page_says_what_was_missed_and_what_is_at_a_bound(as504):

@@ -187,7 +187,7 @@ def of_design(study: Study, folder: Path, ascentwind) -> list[float]:
 
 def of_reproduce(study: Study, folder: Path, ascentwind) -> list[float]:
     found = responses(study.response_statistics([70.0, 75.0, 80.0]))
-    figure = wind_figure(WindComparison({"own": study.response_statistics([70.0, 75.0])}, 0.0), "title")
+    figure = wind_figure(WindComparison({}, 0.0, {"own": study.response_statistics([70.0, 75.0])}), "title")
     solid = np.abs(figure.axes[0].get_lines()[0].get_ydata()).max()
     model = Model.__new__(Model)
     targets = model.figures(study)

@@ -241,3 +241,12 @@ def test_simulated_flights_pass_the_level_as_often():
     at = flown.dataset["sample_path"].sel(response=MOMENTS).isel(t=-1).values
     beyond = (np.linalg.norm(at, axis=1) > law.percentile(p)).mean()
     assert abs(beyond - p) < 2.576 * np.sqrt(p * (1 - p) / runs)
+
+
+def test_a_history_is_drawn_finely_and_says_the_peak_of_the_times_asked(small):
+    fine = two_lags().response_statistics(np.linspace(1.0, 20.0, 30), engine="covariance")
+    both, smooth = (s.resultants([0.01], ["resultant_load"]) for s in (small, fine))
+    axes = history_figure(both, "resultant_load", "two lags", smooth).axes[0]
+    level = smooth.dataset["level"].values[:, 0, 0, 0]
+    np.testing.assert_allclose(np.asarray(axes.get_lines()[0].get_ydata(), float), level)
+    assert f"{both.peaks(0.01)[0].value:.3g} N at 20 s" in {text.get_text() for text in axes.texts}
