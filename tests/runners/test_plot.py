@@ -5,16 +5,14 @@ from __future__ import annotations
 import importlib
 import inspect
 import pkgutil
+import re
 import sys
-from typing import Any, get_args, get_type_hints
 
 import numpy as np
 import pytest
-import xarray as xr
 
 import ascentwind as aw
 import ascentwind.runners
-from ascentwind import ComponentPersistence, Persistence
 from ascentwind.errors import LimitError, ParameterValueError, UnknownNameError, UnusedOptionError
 from ascentwind.model.wind.range_reference import shipped_statistics
 from ascentwind.runners.case.case import Case
@@ -22,6 +20,7 @@ from ascentwind.runners.design.design import design
 from ascentwind.runners.design.problem import LoadReliefProblem
 from ascentwind.runners.figures.plot import PLOTTED
 
+OTHERS = {"Study", "Self", "xr", "Dataset", "DataArray", "Any", "Lasting"}  # how long winds last is no result
 PNG = b"\x89PNG\r\n\x1a\n"
 
 
@@ -106,13 +105,12 @@ def test_what_shows_itself_has_a_figure():
 
 def test_what_a_study_returns_shows_itself():
     """A result of a question is a dataset or matrices, or one of those that have a figure."""
-    others = (Case, xr.Dataset, xr.DataArray, Persistence, ComponentPersistence)
+    known = {kind.__name__ for kind in PLOTTED} | OTHERS
     for name, method in vars(aw.Study).items():
         if name.startswith("_") or not inspect.isfunction(method):
             continue
-        returned = get_type_hints(method)["return"]
-        for kind in get_args(returned) or (returned,):
-            assert kind is Any or issubclass(kind, (*PLOTTED, *others)), f"{name} returns {kind}, which has no figure"
+        returned = set(re.findall(r"\w+", str(method.__annotations__["return"])))
+        assert returned <= known, f"{name} returns {returned - known}, which has no figure"
 
 
 @pytest.mark.slow
