@@ -1,108 +1,136 @@
 """Processor time of the commands, children included, as ratios of one run: to importing them, and to another version.
 
-    python benchmarks/commands.py [PYTHON_WITH_AN_OTHER_VERSION]
+    python benchmarks/commands.py [PYTHON_WITH_AN_OTHER_VERSION [FIRST_WORDS_OF_COMMANDS...]]
 
-Each command runs in an empty folder of its own with a cache of compiled models of its own: first with nothing there
-(cold), then in turn with the others; the least of the turns counts, so that other work on the machine favours none.
-With the Python of an environment that holds another version the same commands run there as well, where it has them.
+Each version runs in a folder of its own with caches of compiled models and of bytecode of its own. Commands run once to
+fill them, then in turn, and the least of the turns counts, so that other work on the machine favours none; ``first`` is
+with an empty cache of compiled models. With the Python of an environment that holds another version the same commands
+run there as well, where it has them, and ``same/`` is that version's AS-504, whose outputs both give.
 """
 
 from __future__ import annotations
 
 import os
 import resource
+import shutil
 import subprocess
 import sys
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
-ROUNDS = 3
+ROUNDS = 2
 IMPORT = "import ascentwind.runners.cli.app"
-WARM_LOAD = "from ascentwind.runners import Study; Study.load('as504')"
+WARM_LOAD = "from ascentwind.runners.study import Study; Study.load('as504')"
+SHIPPED = "import ascentwind.model as model; print(*model.__path__)"
 LIMITS = "time [s],bending_moment [N m]\n10,60e6\n150,60e6\n"
+SAME = "same/as504"
 COMMANDS = (
-    ("--help",),
-    ("run", "as504"),
-    ("run", "as504", "--set", "planes=both"),
-    ("run", "falcon1"),
-    ("verify", "as504"),
-    ("tolerance", "as504"),
-    ("sensitivity", "as504"),
-    ("flight-load", "as504", "--response", "bending_moment"),
-    ("gust", "as504"),
-    ("availability", "as504", "--limit", "limits.csv"),
-    ("build-vehicle", "as504"),
-    ("regenerate", "as504"),
+    "--help",
+    "run as504",
+    f"run {SAME}",
+    "verify as504",
+    f"verify {SAME}",
+    "tolerance as504",
+    f"tolerance {SAME}",
+    "sensitivity as504",
+    "build-vehicle as504 --out built",
+    "inspect as504 --time 75",
+    "flight-load as504 --response bending_moment",
+    "gust as504",
+    "availability as504 --limit limits.csv",
+    "regenerate as504 --out generated",
+    "run as504 --set planes=both",
+    "run falcon1",
 )
+COLD = ("Study.load", "run as504", f"run {SAME}")
 
 
 @dataclass
 class Version:
-    """One version, its cache, and what its programs took (s)."""
+    """One version, its folder, and what its programs took (s)."""
 
     python: Path
     folder: Path
-    cold: dict[str, float]
-    least: dict[str, float]
+    cold: dict[str, float] = field(default_factory=dict)
+    least: dict[str, float] = field(default_factory=dict)
 
-    def seconds(self, program: tuple[str, ...]) -> float:
+    def seconds(self, program: tuple[str, ...], cache: str = "cache") -> float:
         """Return the processor time of a program and its children, s; NaN where it fails."""
 
         def used() -> float:
             children = resource.getrusage(resource.RUSAGE_CHILDREN)
             return children.ru_utime + children.ru_stime
 
-        surroundings = os.environ | {"ASCENTWIND_CACHE": str(self.folder / "cache"), "OPENBLAS_NUM_THREADS": "1"}
+        own = {"ASCENTWIND_CACHE": str(self.folder / cache), "PYTHONPYCACHEPREFIX": str(self.folder / "bytecode")}
+        surroundings = os.environ | own | {"OPENBLAS_NUM_THREADS": "1"}
+        surroundings.pop("PYTHONDONTWRITEBYTECODE", None)
         before = used()
         done = subprocess.run(
             program, cwd=self.folder, env=surroundings, capture_output=True, stdin=subprocess.DEVNULL, check=False
         )
         return used() - before if done.returncode == 0 else float("nan")
 
-    def programs(self) -> dict[str, tuple[str, ...]]:
+    def programs(self, wanted: list[str]) -> dict[str, tuple[str, ...]]:
         """Return the programs by the names under which they are printed."""
         python, command = str(self.python), str(self.python.with_name("ascentwind"))
         found = {"import": (python, "-c", IMPORT), "Study.load": (python, "-c", WARM_LOAD)}
-        return found | {" ".join(arguments): (command, *arguments) for arguments in COMMANDS}
+        always = ("run as504", f"run {SAME}")
+        chosen = [line for line in COMMANDS if not wanted or line in always or line.startswith(tuple(wanted))]
+        return found | {line: (command, *line.split()) for line in chosen}
 
-    def measure(self, name: str) -> None:
+    def measure(self, name: str, program: tuple[str, ...]) -> None:
         """Run a program once more; what fails is not run again."""
         before = self.least.get(name, float("inf"))
         if before == before:  # no NaN
-            self.least[name] = min(self.seconds(self.programs()[name]), before)
+            self.least[name] = min(self.seconds(program), before)
+
+
+def prepared(python: Path, folder: Path, other: Path) -> Version:
+    """Return a version with the files that its commands read, the vehicle of the other one among them."""
+    folder.mkdir()
+    (folder / "limits.csv").write_text(LIMITS, encoding="utf-8")
+    where = subprocess.run([str(other), "-c", SHIPPED], capture_output=True, text=True, check=True, cwd=folder).stdout
+    shutil.copytree(Path(where.strip()) / "vehicles" / "as504", folder / SAME)
+    return Version(python, folder)
 
 
 def main() -> None:
     """Measure and print."""
-    pythons = [Path(sys.executable), *(Path(other) for other in sys.argv[1:])]
+    own, *others = [Path(sys.executable), *(Path(python) for python in sys.argv[1:2])]
+    wanted = sys.argv[2:]
     with tempfile.TemporaryDirectory() as top:
-        versions = []
-        for number, python in enumerate(pythons):
-            folder = Path(top) / str(number)
-            folder.mkdir()
-            (folder / "limits.csv").write_text(LIMITS, encoding="utf-8")
-            versions.append(Version(python, folder, {}, {}))
-        names = list(versions[0].programs())
-        for version in versions:
-            for name in names:
-                version.cold[name] = version.seconds(version.programs()[name])
+        versions = [
+            prepared(python, Path(top) / str(k), (others or [own])[0]) for k, python in enumerate([own, *others])
+        ]
+        programs = [version.programs(wanted) for version in versions]
+        for version, its in zip(versions, programs, strict=True):
+            version.seconds(its["import"])
+            for name, program in its.items():
+                if name in COLD:
+                    version.cold[name] = version.seconds(program, f"empty {len(version.cold)}")
+                version.measure(name, program)
+                version.least[name] += 1e9  # it filled the caches, and does not count
         for turn in range(ROUNDS):
-            for name in names:
-                for version in versions:
-                    version.measure(name)
+            for name in programs[0]:
+                for version, its in zip(versions, programs, strict=True):
+                    version.measure(name, its[name])
             print(f"turn {turn + 1} of {ROUNDS} done", file=sys.stderr, flush=True)
+    show(*versions)
+
+
+def show(own: Version, other: Version | None = None) -> None:
+    """Print the table."""
     print(f"processor time of this version, least of {ROUNDS} in turn; 'first' with an empty cache of compiled models")
-    print(
-        f"{'':34}{'s':>8}{'/ import':>10}{'first, s':>10}"
-        + ("{:>12}{:>12}".format("/ other", "first") * bool(versions[1:]))
-    )
-    own = versions[0]
-    for name in names:
-        line = f"{name:34}{own.least[name]:8.2f}{own.least[name] / own.least['import']:10.2f}{own.cold[name]:10.2f}"
-        for other in versions[1:]:
-            line += f"{own.least[name] / other.least[name]:12.2f}{own.cold[name] / other.cold[name]:12.2f}"
-        print(line)
+    heads = ("s", "/ import", "first, s") + ("/ other", "/ its run", "first / other") * (other is not None)
+    print(" " * 46 + "".join(f"{head:>14}" for head in heads))
+    for name, seconds in own.least.items():
+        first = own.cold.get(name, float("nan"))
+        numbers = [seconds, seconds / own.least["import"], first]
+        if other is not None:
+            run = other.least[f"run {SAME}" if SAME in name else "run as504"]
+            numbers += [seconds / other.least[name], seconds / run, first / other.cold.get(name, float("nan"))]
+        print(f"{name:46}" + "".join(f"{number:14.2f}" if number == number else " " * 14 for number in numbers))
 
 
 if __name__ == "__main__":
