@@ -88,6 +88,7 @@ def run(
     from ..present.style import write_figure
     from ..present.wording import words
     from ..statistics.engines import engine_from
+    from ..statistics.files import write_stored
     from ..statistics.larger_side import LABEL
     from ..statistics.norm import LIKE_3_SIGMA
     from ..statistics.peak_check import with_peak_check
@@ -157,7 +158,7 @@ def run(
             statistics = with_flight_levels(statistics, loads)
     finally:  # once for all of them, and in time for an interrupt
         if statistics is not computed:
-            statistics.save(job.folder)
+            write_stored(statistics.dataset, job.folder)
     with steps("figures", len(study.system.outputs) + 2) as bar:
         if both is not None:
             finer = _drawn(study, statistics, end_times, chosen, RESULTANTS_DRAWN)

@@ -19,6 +19,7 @@ from ...model.system.names import COMBINED, file_name
 from .files import write_whole
 
 PIXELS = 150  # an inch, of PNG files
+PACKED = {"compress_level": 1}  # up to a tenth larger than by default, packed in a third of the time
 TITLE_WIDTH = 76  # characters across a figure of 8 inches
 STYLE: dict[Any, Any] = {
     "figure.figsize": (8.0, 5.0),
@@ -66,7 +67,7 @@ def write_figure(figure: matplotlib_figure.Figure, folder: Path, name: str) -> l
     _take_dollars_as_written(figure)
     with rc_context(STYLE):
         figure.dpi = PIXELS
-        png = write_whole(folder / f"{name}.png", lambda p: FigureCanvasAgg(figure).print_png(p))
+        png = write_whole(folder / f"{name}.png", lambda p: FigureCanvasAgg(figure).print_png(p, pil_kwargs=PACKED))
         figure.set_layout_engine("none")  # what it has found holds for both files
         svg = write_whole(
             folder / f"{name}.svg", lambda p: FigureCanvasSVG(figure).print_svg(str(p), metadata={"Date": None})

@@ -21,10 +21,12 @@ COLUMNS = ("time_s", "response", "unit", "source", "mean", "variance", "std", "m
 def write_statistics(statistics: xr.Dataset, folder: Path) -> list[Path]:
     """Write statistics.nc (NetCDF) and statistics.csv (one row a member, time, response and source)."""
     text = statistics_csv(statistics)
-    return [
-        write_netcdf(by_response(statistics), folder / NAME),
-        write_text(folder / "statistics.csv", text),
-    ]
+    return [write_stored(statistics, folder), write_text(folder / "statistics.csv", text)]
+
+
+def write_stored(statistics: xr.Dataset, folder: Path) -> Path:
+    """Write statistics.nc alone: of statistics that were written before, with more that the table does not hold."""
+    return write_netcdf(by_response(statistics), folder / NAME)
 
 
 def by_response(statistics: xr.Dataset) -> xr.Dataset:
