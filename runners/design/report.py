@@ -94,7 +94,7 @@ def write_trade(trades: Mapping[str, Sequence[TradePoint]], response: str, title
         for point in points:
             row: list[str] = [variant, f"{point.limit:.10g}"]
             if point.result is None:
-                row += ["" if point.closest is None else f"{point.closest:.10g}", "", "", ""]
+                row += ["" if point.closest is None else f"{point.closest:.10g}", "", "", "", *[""] * len(names)]
             else:
                 reached = next(q.after for q in point.result.quantities if q.name == f"peak {response}")
                 row += ["", f"{point.result.peak:.10g}", f"{reached:.10g}", str(int(point.result.converged))]

@@ -255,7 +255,9 @@ def at_levels(
             f"no profile holds {'all' if incomplete == 'drop' else 'any'} of the {levels.size} levels from "
             f"{levels[0]:g} to {levels[-1]:g} m; ask for others, or allow a larger gap", file=profiles[0].file or None,
         )  # fmt: skip
-    times = np.array([np.datetime64("NaT") if p.time is None else np.datetime64(p.time) for p in kept], "datetime64[m]")
+    times = np.array(
+        [np.datetime64("NaT", "m") if p.time is None else np.datetime64(p.time) for p in kept], "datetime64[m]"
+    )
     stated = np.array([p.hours_stated for p in kept])
     files = list(dict.fromkeys(Path(p.file).name for p in kept))
     source = f"soundings of {', '.join(files[:3])}{', ...' if len(files) > 3 else ''}"

@@ -62,6 +62,9 @@ def test_command_designs_recomputes_trades_and_writes(as504, tmp_path, monkeypat
         peak = float((abs(combined["mean"]) + 3 * combined["std"]).sel(response=name).max())
         assert after[f"peak {name}"] == pytest.approx(peak, rel=1e-6)
     with (out / "trade.csv").open() as text:
+        lengths = {len(row) for row in csv.reader(text)}
+    assert len(lengths) == 1  # what was missed has all columns too, or no report reads it
+    with (out / "trade.csv").open() as text:
         met, missed = csv.DictReader(text)
     assert met["converged"] == "1"
     assert float(met["peak"]) >= after["peak bending_moment"] * (1 - 1e-9)  # fewer parameters cannot do better

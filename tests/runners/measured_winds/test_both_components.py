@@ -32,7 +32,7 @@ def both(cache):
 
 def drawn(case, levels, count: int, seed: int = 1) -> Soundings:
     wind = random_wind(case, levels).drawn(np.random.default_rng(seed), count)
-    none, k = np.full(count, np.datetime64("NaT"), "datetime64[m]"), levels.size
+    none, k = np.full(count, np.datetime64("NaT", "m"), "datetime64[m]"), levels.size
     return Soundings(levels, wind[:, :k], wind[:, k:], none, tuple(map(str, range(count))), "", "drawn")
 
 

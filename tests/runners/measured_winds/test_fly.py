@@ -32,7 +32,7 @@ TIMES = [41.0, 60.0, 75.0, 79.5, 90.0]
 
 def soundings(levels, wind, names=None) -> Soundings:
     n = len(wind)
-    none = np.full(n, np.datetime64("NaT"), "datetime64[m]")
+    none = np.full(n, np.datetime64("NaT", "m"), "datetime64[m]")
     return Soundings(np.asarray(levels, float), wind, 0 * wind, none, names or tuple(map(str, range(n))), "", "drawn")
 
 
