@@ -28,13 +28,13 @@ def coefficient_figure(
     rate = np.gradient(altitude, time)
     values = [shaping_filter.at(h) for h in altitude]
     panels = {
-        "ḣ F, 1/s": (shaping_filter.order, shaping_filter.order, lambda v, r: r * v[0]),
-        "√ḣ G, 1/√s": (
+        "ḣ F (1/s)": (shaping_filter.order, shaping_filter.order, lambda v, r: r * v[0]),
+        "√ḣ G (1/√s)": (
             shaping_filter.order,
             shaping_filter.noise_count,
             lambda v, r: np.sqrt(max(r, 0.0)) * v[1],
         ),
-        "H, m/s": (1, shaping_filter.order, lambda v, r: v[2][None]),
+        "H (m/s)": (1, shaping_filter.order, lambda v, r: v[2][None]),
     }
     with rc_context(STYLE):
         figure = Figure(figsize=(8, 9), layout="constrained")
@@ -48,7 +48,7 @@ def coefficient_figure(
                         axes.plot(time, data[:, i, j], label=f"{i + 1},{j + 1}" if rows > 1 else f"{j + 1}")
             axes.set_ylabel(label)
             axes.legend(ncols=4, fontsize=8)
-        figure.axes[-1].set_xlabel("flight time, s")
+        figure.axes[-1].set_xlabel("flight time (s)")
         figure.suptitle(f"Filter coefficients over flight time\n{shaping_filter.name.replace('_', ' ')}")
     return figure
 
@@ -63,9 +63,9 @@ def covariance_figure(statistics: WindStatistics, covariance: NDArray[np.float64
             for n, i in enumerate(group):
                 axes.plot(h, covariance[i], color=f"C{n}", label=f"{h[i]:.3g} km")
                 axes.plot(h, data[i], "o", color=f"C{n}", markersize=3.5)
-            axes.set_xlabel("altitude, km")
-            axes.legend(fontsize=8)
-        figure.axes[0].set_ylabel("covariance, m²/s²")
+            axes.set_xlabel("altitude (km)")
+            axes.legend(title="with the wind at", fontsize=8, title_fontsize=8)
+        figure.axes[0].set_ylabel("covariance (m²/s²)")
         figure.suptitle(f"{title}\nlines: filter, dots: data")
     return figure
 
@@ -81,8 +81,8 @@ def interval_figure(statistics: WindStatistics, covariance: NDArray[np.float64],
         axes.fill_between(h, low[i], high[i], color=BAND, label="90 % interval", linewidth=0)
         axes.plot(h, statistics.covariance[i], "o", color=DATA, markersize=4, label="data")
         axes.plot(h, covariance[i], color=FILTER, label="filter")
-        axes.set_xlabel("altitude, km")
-        axes.set_ylabel("covariance, m²/s²")
+        axes.set_xlabel("altitude (km)")
+        axes.set_ylabel("covariance (m²/s²)")
         axes.legend()
         axes.set_title(f"Covariance with {h[i]:.3g} km, {statistics.name}, N = {statistics.independent_samples:.0f}")
     return figure
@@ -100,8 +100,8 @@ def deviation_figure(statistics: WindStatistics, coefficients: NDArray[np.float6
         axes.plot(h, [float(deviation_form(x, coefficients)) for x in h], color=FILTER, label="fit of the same form")
         axes.plot(h, report_standard_deviation(1000.0 * h), "--", color="#c8442c", label="report's fit (Appendix A)")
         axes.set_ylim(0.0)
-        axes.set_xlabel("altitude, km")
-        axes.set_ylabel("standard deviation, m/s")
+        axes.set_xlabel("altitude (km)")
+        axes.set_ylabel("standard deviation (m/s)")
         axes.legend()
         axes.set_title(f"Standard deviation, {statistics.name}")
     return figure
@@ -117,8 +117,8 @@ def error_figure(results: list[SynthesisResult]) -> Figure:
             axes.semilogy(
                 result.statistics.altitude / 1000.0, result.error_by_altitude, marker="o", markersize=3, label=label
             )
-        axes.set_xlabel("altitude, km")
-        axes.set_ylabel("rms error of the covariances, m²/s²")
+        axes.set_xlabel("altitude (km)")
+        axes.set_ylabel("rms error of the covariances (m²/s²)")
         axes.legend()
         axes.set_title(f"Syntheses for {results[0].statistics.name}")
     return figure
