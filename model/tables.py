@@ -21,6 +21,7 @@ from .errors import DataError
 
 ORDER = 4  # coefficients of a cubic
 Kind = Literal["given", "mean"]  # of a group of tables
+MeanKind = Literal["output", "state"]
 INTERPOLATIONS = ("cubic", "pchip", "linear", "step")
 
 
@@ -142,6 +143,8 @@ class TableGroup:
         Interval, power 0 to 3 of (argument - left knot), table.
     kind : {'given', 'mean'}
         Numbers of a vehicle and its wind, or the mean response, which follows from them and is zero until computed.
+    sources : (m,) tuple of pairs
+        Of the mean response: 'output' or 'state', and the name of the one that each table holds.
     """
 
     name: str
@@ -151,11 +154,14 @@ class TableGroup:
     knots: NDArray[np.float64]
     coefficients: NDArray[np.float64]
     kind: Kind = "given"
+    sources: tuple[tuple[MeanKind, str], ...] = ()
 
     def __post_init__(self):
         k, m = self.knots.size, len(self.names)
         if self.coefficients.shape != (k - 1, ORDER, m) or len(self.units) != m:
             raise DataError(f"table group '{self.name}': coefficients do not match {k} knots and {m} tables")
+        if len(self.sources) != (m if self.kind == "mean" else 0):
+            raise DataError(f"table group '{self.name}': a table of the mean response, and no other, has its source")
 
     @staticmethod
     def from_polynomials(

@@ -23,7 +23,8 @@ def _plan(size: int, rows: tuple[int, ...], columns: tuple[int, ...]) -> NDArray
     uppers: list[list[int]] = []
     while rest:
         block = filled[np.ix_(rest, rest)]
-        cost = (block.sum(axis=0) - 1) * (block.sum(axis=1) - 1)
+        others = block.sum(axis=1) - 1
+        cost = (block.sum(axis=0) - 1) * others * size + others  # of equals first what nothing drives: no products
         pivot = rest.pop(int(np.argmin(cost)))
         below = [i for i in rest if filled[i, pivot]]
         right = [j for j in rest if filled[pivot, j]]

@@ -15,7 +15,7 @@ from ..system.functions import declared_sizes
 from ..system.nominal import NominalNumbers
 from ..toolchain.library import Library
 from .kinds import kinds
-from .on_grid import takes_a_grid
+from .on_grid import fills_means, takes_a_grid
 from .segments import GridSteps, SegmentResults, Segments
 from .source import LANES, MOST_STEPS, SweepFunctions
 
@@ -70,6 +70,12 @@ class CompiledSweep:
         A = self.functions.stage.sparsity_out(0)
         return takes_a_grid(kinds(A, LANES), A)
 
+    @cached_property
+    def fills_means(self) -> bool:
+        """Whether it fills the tables of the mean response itself."""
+        A = self.functions.stage.sparsity_out(0)
+        return self.takes_a_grid and fills_means(kinds(A, LANES), A, self.functions.means)
+
     def on_grid(
         self,
         executable: ExecutableSystem | NominalNumbers,
@@ -77,6 +83,7 @@ class CompiledSweep:
         grid: GridSteps,
         state: NDArray[np.float64] | None = None,
         steps: bool = False,
+        fill: bool = False,
     ) -> SegmentResults:
         """Sweep over segments with given steps, of Gauss collocation of order 8.
 
@@ -91,6 +98,9 @@ class CompiledSweep:
             Covariances of the states at the start, which become those at the end; the system's own without it.
         steps : bool
             Keep the transition matrix of every segment and what noise adds in it.
+        fill : bool
+            Take the mean that the tables of the mean response hold from the steps themselves, where
+            :attr:`fills_means`; what the tables hold is not looked at then.
 
         Returns
         -------
@@ -110,7 +120,7 @@ class CompiledSweep:
         counters, failure = np.zeros(3), np.zeros(2)
         arrays = (segments.end, segments.low, segments.high)
         given = [k, *(np.ascontiguousarray(array, float) for array in arrays)]
-        given += [np.ascontiguousarray(grid.counts, np.intc), np.ascontiguousarray(grid.edges, float)]
+        given += [np.ascontiguousarray(grid.counts, np.intc), np.ascontiguousarray(grid.edges, float), int(fill)]
         given += [np.ascontiguousarray(array, float) for array in (executable.parameters, executable.tables)]
         results = (state, np.zeros(n), covariance, mean, transition, added, counters, failure)
         code = self.shared_library.call("sweep_on_grid", *given, *results)

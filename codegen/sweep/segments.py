@@ -25,6 +25,16 @@ class Segments:
     low: NDArray[np.float64]
     high: NDArray[np.float64]
 
+    @property
+    def begin(self) -> NDArray[np.float64]:
+        """Where each begins, (k,), s."""
+        return np.concatenate([[self.start], self.end[:-1]])
+
+    def cut(self, pieces: NDArray[np.intp]) -> Segments:
+        """Return every segment in as many equal pieces as asked."""
+        ends = equal_parts(self, pieces)
+        return Segments(self.start, ends, np.repeat(self.low, pieces), np.repeat(self.high, pieces))
+
 
 @dataclass(frozen=True, eq=False)
 class GridSteps:
@@ -44,12 +54,17 @@ class GridSteps:
     @staticmethod
     def equal(segments: Segments, counts: NDArray[np.intc]) -> GridSteps:
         """Divide every segment into equal steps."""
-        begin = np.concatenate([[segments.start], segments.end[:-1]])
-        number = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts) + 1
-        length = np.repeat((segments.end - begin) / counts, counts)
-        edges = np.concatenate([[segments.start], np.repeat(begin, counts) + number * length])
-        edges[np.cumsum(counts)] = segments.end
+        edges = np.concatenate([[segments.start], equal_parts(segments, counts)])
         return GridSteps(np.asarray(counts, np.intc), edges)
+
+
+def equal_parts(segments: Segments, counts: NDArray[np.integer]) -> NDArray[np.float64]:
+    """Return the ends of equal parts of segments, (sum of counts,), s."""
+    number = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts) + 1
+    length = np.repeat((segments.end - segments.begin) / counts, counts)
+    ends = np.repeat(segments.begin, counts) + number * length
+    ends[np.cumsum(counts) - 1] = segments.end
+    return ends
 
 
 @dataclass(frozen=True, eq=False)

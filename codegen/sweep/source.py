@@ -9,11 +9,12 @@ from itertools import groupby
 import casadi as ca
 
 from ...model.system.linear_system import LinearSystem
-from ..system.functions import known_rate
+from ..system.functions import direct_response, known_rate
 from ..system.table_layout import table_layout
 from ..toolchain.c_printer import c_function, c_statements, enumerators
 from ..toolchain.fingerprint import fingerprint
 from ..toolchain.templates import render
+from .filled_means import FilledMeans, filled_means
 from .kinds import Kind, Span, kinds, spans
 from .on_grid import TEMPLATE, grid_arguments
 from .runge_kutta import DOP853, RungeKutta
@@ -32,20 +33,22 @@ class SweepFunctions:
         (t, v, p) -> A, B and E u, sparse: all that a stage needs, common subexpressions shared between them.
     output : Function
         (t, v, p) -> C, sparse, and G u, dense.
+    means : FilledMeans or None
+        How a sweep on a grid fills the tables of the mean response.
     """
 
     stage: ca.Function
     output: ca.Function
+    means: FilledMeans | None
 
 
 def sweep_functions(system: LinearSystem) -> SweepFunctions:
     """Derive the functions of a system that its sweep needs."""
     at = [system.time, system.v, system.p]
-    inputs = system.input_values
-    direct = ca.densify(system.G @ inputs) if system.u.numel() else ca.SX.zeros(len(system.outputs))
     return SweepFunctions(
         stage=ca.Function("stage", at, ca.cse([system.A, system.B, ca.sparsify(known_rate(system))])),
-        output=ca.Function("output", at, ca.cse([system.C, direct])),
+        output=ca.Function("output", at, ca.cse([system.C, direct_response(system)])),
+        means=filled_means(system),
     )
 
 
@@ -53,7 +56,8 @@ def sweep_fingerprint(system: LinearSystem, functions: SweepFunctions) -> str:
     """Return a hash of all that ``sweep_source`` writes from."""
     files = (
         *("sweep/source.py", "sweep/kinds.py", "sweep/runge_kutta.py", "templates/sweep.c.jinja"),
-        *("sweep/on_grid.py", "sweep/gauss_legendre.py", "nodes/elimination.py", f"templates/{TEMPLATE}"),
+        *("sweep/on_grid.py", "sweep/filled_means.py", "sweep/gauss_legendre.py", "nodes/elimination.py"),
+        f"templates/{TEMPLATE}",
     )
     return fingerprint(system, (functions.stage, functions.output), files)
 
@@ -116,7 +120,7 @@ def sweep_source(
         weighted=weighted,
     )
     source = render("sweep.c.jinja", **values)
-    more = grid_arguments(of, kind_values, A, LANES) if with_grid else None
+    more = grid_arguments(of, kind_values, A, LANES, names, functions.means) if with_grid else None
     return source if more is None else source + render(TEMPLATE, **values, **more)
 
 

@@ -105,6 +105,11 @@ def known_rate(system: LinearSystem) -> ca.SX:
     return system.E @ system.input_values if system.u.numel() else ca.SX.zeros(len(system.states))
 
 
+def direct_response(system: LinearSystem) -> ca.SX:
+    """Return G u, (n_y, 1), dense: what known inputs do to the responses at once."""
+    return ca.densify(system.G @ system.input_values) if system.u.numel() else ca.SX.zeros(len(system.outputs))
+
+
 def state_scales(system: LinearSystem) -> np.ndarray:
     """Return the typical sizes of the states, shape (n,)."""
     return np.array([s.scale for s in system.states])

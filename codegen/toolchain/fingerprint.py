@@ -33,7 +33,7 @@ def fingerprint(system: LinearSystem, functions: Iterable[ca.Function], files: I
     for p in system.parameters:
         digest.update(repr((p.name, p.unit)).encode())
     for g in system.tables:
-        digest.update(repr((g.name, g.argument, g.names, g.units, g.knots.size)).encode())
+        digest.update(repr((g.name, g.argument, g.names, g.units, g.knots.size, g.sources)).encode())
     for file in (*files, *_SHARED):
         digest.update((_CODEGEN / file).read_bytes())
     return digest.hexdigest()

@@ -8,13 +8,13 @@ from itertools import pairwise
 import numpy as np
 
 from ..errors import UnknownNameError
-from ..tables import TableGroup
+from ..tables import MeanKind, TableGroup
 from ..vehicle.mean_wind import PROGRAMME
 from ..vehicle.planes import flown_planes
 from ..vehicle.vehicle import Vehicle
 
 # tables of the mean response in a plane, all in rad, and the output or state that each holds
-MEAN_TABLES = {
+MEAN_TABLES: dict[str, tuple[MeanKind, str]] = {
     "mean.angle_of_attack": ("output", "angle_of_attack"),
     "mean.engine_angle": ("output", "engine_angle"),
     "mean.attitude": ("state", "attitude"),
@@ -44,11 +44,12 @@ def vehicle_tables(vehicle: Vehicle) -> tuple[TableGroup, ...]:
     knots = mean_knots(vehicle.start, vehicle.end, vehicle.discontinuities)
     names = tuple(f"{plane.scope}{name}" for plane in flown_planes(vehicle) for name in MEAN_TABLES)
     zero = np.zeros((knots.size - 1, 4, len(names)))
-    mean_group = TableGroup("mean", "time", names, ("rad",) * len(names), knots, zero, "mean")
+    sources = tuple(mean_source(name) for name in names)
+    mean_group = TableGroup("mean", "time", names, ("rad",) * len(names), knots, zero, "mean", sources)
     return flight, wind_group, mean_group
 
 
-def mean_source(table: str) -> tuple[str, str]:
+def mean_source(table: str) -> tuple[MeanKind, str]:
     """Return whether a table of the mean response holds an 'output' or a 'state', and which."""
     for name, (kind, what) in MEAN_TABLES.items():
         if table == name or table.endswith(f".{name}"):

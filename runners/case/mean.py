@@ -26,14 +26,8 @@ class Mean(Protocol):
 class LinearMean:
     """The mean of the linear equations."""
 
-    def fill(self, executable: ExecutableSystem, respond: Respond = mean_response) -> ExecutableSystem:
-        """Return the system with its tables of the mean; ``respond`` computes it.
-
-        Raises
-        ------
-        IntegrationError
-        """
-        return with_mean_tables(executable, respond)
+    # the function itself, by which batches know that they may fill the tables within a sweep
+    fill = staticmethod(with_mean_tables)
 
 
 @dataclass(frozen=True, eq=False)

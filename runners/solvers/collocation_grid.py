@@ -156,7 +156,14 @@ def _single(groups: Sequence[TableGroup], name: str) -> TableGroup:
     """Return one table over time as a group of its own."""
     group = next(g for g in groups if name in g.names)
     at = group.names.index(name)
-    return replace(group, names=(name,), units=(group.units[at],), coefficients=group.coefficients[:, :, [at]])
+    here = slice(at, at + 1)
+    return replace(
+        group,
+        names=group.names[here],
+        units=group.units[here],
+        coefficients=group.coefficients[:, :, here],
+        sources=group.sources[here],
+    )
 
 
 def tables_at(groups: Sequence[TableGroup], times: NDArray) -> NDArray[np.float64]:

@@ -13,7 +13,6 @@ from scipy.interpolate import CubicSpline
 
 from ...codegen.system.executable import ExecutableSystem
 from ...codegen.system.functions import state_scales
-from ...model.equations.vehicle_tables import mean_source
 from ...model.tables import TableGroup
 from .integration import CvodesSettings, Integrator
 from .step_budget import naming_fastest_root
@@ -121,8 +120,7 @@ def with_mean_tables(
     group = executable.groups[at]
     mean = respond(executable, group.knots)
     columns = []
-    for name in group.names:
-        kind, what = mean_source(name)
+    for kind, what in group.sources:
         if kind == "output":
             columns.append(mean.outputs[:, system.output_index(what)])
         else:

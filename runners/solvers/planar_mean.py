@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ...codegen.system.executable import ExecutableSystem
 from ...codegen.system.functions import INPUTS, OUTPUTS, spline_lookup
 from ...model.construction.planar_equations import PlanarLoop, planar_loop
-from ...model.equations.vehicle_tables import mean_knots, mean_source
+from ...model.equations.vehicle_tables import mean_knots
 from ...model.errors import DataError
 from ...model.vehicle.vehicle import Vehicle
 from .integration import CvodesSettings, Integrator
@@ -158,7 +158,7 @@ def with_nonlinear_mean(vehicle: Vehicle, filled: ExecutableSystem) -> Executabl
     """
     at = next(i for i, group in enumerate(filled.groups) if group.kind == "mean")
     group, found = filled.groups[at], planar_mean(vehicle, filled)
-    columns = [RESPONSES.index(mean_source(name)[1]) for name in group.names]
+    columns = [RESPONSES.index(what) for _, what in group.sources]
     correction = mean_splines(group, (found.nonlinear - found.linear)[:, columns], filled.system.discontinuities)
     summed = replace(group, coefficients=group.coefficients + correction.coefficients)
     return filled.with_numbers(groups=(*filled.groups[:at], summed, *filled.groups[at + 1 :]))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import pairwise
 
@@ -138,7 +138,6 @@ def sweep(
     longest_interval: float = float("inf"),
     weighting_spacing: float | None = None,
     responses: Sequence[str] | None = None,
-    rule: StepRule | None = None,
 ) -> SweepResult:
     """Sweep once over the flight for all end times.
 
@@ -157,32 +156,47 @@ def sweep(
         Keep the weighting functions at points at most this many seconds apart.
     responses : sequence of str, optional
         Those wanted; all are computed, and only these are refused where white noise reaches them directly.
-    rule : StepRule, optional
-        Of the steps of a grid, instead of steps that the tolerance controls; these follow where the grid fails.
 
     Raises
     ------
     TimeRangeError, DirectNoiseError, IntegrationError, DataError
     """
-    system, ends = compiled.system, check_times(compiled.system, times)
+    ends = _checked(compiled.system, times, relative_tolerance, responses)
+    nodes = time_nodes(executable, ends)
+    longest = longest_segment(float(ends[-1] - compiled.system.start))
+    segments = _segments_of(executable, nodes, min(longest, longest_interval, weighting_spacing or longest))
+    result = swept(compiled, executable, segments, relative_tolerance, steps=weighting_spacing is not None)
+    found = _at_nodes(executable, segments, nodes, ends, result)
+    if result.transition is None:
+        return found
+    at = np.where(nodes > compiled.system.start, np.searchsorted(segments.end, nodes), -1)
+    return replace(found, weighting=_weighting_functions(executable, segments, at, result.transition))
+
+
+def _checked(
+    system: LinearSystem, times: ArrayLike, relative_tolerance: float, responses: Sequence[str] | None
+) -> NDArray[np.float64]:
+    """Return end times after all that is asked was checked."""
+    ends = check_times(system, times)
     check_relative_tolerance(relative_tolerance, LEAST_TOLERANCE)
     system.refuse_direct_noise(system.output_names if responses is None else responses)
-    longest = longest_segment(float(ends[-1] - system.start))
-    longest = min(longest, longest_interval, weighting_spacing or longest)
-    nodes = time_nodes(executable, ends)
-    segments = _segments_of(executable, nodes, longest)
-    result = None if rule is None or weighting_spacing is not None else _on_grid(compiled, executable, segments, rule)
-    if result is None:
-        result = swept(compiled, executable, segments, relative_tolerance, steps=weighting_spacing is not None)
-    at = np.where(nodes > system.start, np.searchsorted(segments.end, nodes), -1)
+    return ends
+
+
+def _at_nodes(
+    executable: ExecutableSystem,
+    segments: Segments,
+    nodes: NDArray[np.float64],
+    ends: NDArray[np.float64],
+    result: SegmentResults,
+) -> SweepResult:
+    """Take from the ends of segments what was asked for; at the start nothing has acted yet."""
+    at = np.where(nodes > executable.system.start, np.searchsorted(segments.end, nodes), -1)
     found = result.covariance[at], result.mean[at], result.error[at]
     if at[0] < 0:
         for array, value in zip(found, _at_start(executable, segments), strict=True):
             array[at < 0] = value
-    weighting = None
-    if result.transition is not None:
-        weighting = _weighting_functions(executable, segments, at, result.transition)
-    return SweepResult(ends, *found, result.counters, weighting)
+    return SweepResult(ends, *found, result.counters)
 
 
 def _segments_of(executable: ExecutableSystem, nodes: NDArray[np.float64], longest: float) -> Segments:
@@ -194,11 +208,13 @@ def _segments_of(executable: ExecutableSystem, nodes: NDArray[np.float64], longe
 
 
 def _on_grid(
-    compiled: CompiledSweep, executable: ExecutableSystem, segments: Segments, rule: StepRule
-) -> SegmentResults | None:
+    compiled: CompiledSweep, member: ExecutableSystem, ends: NDArray[np.float64], rule: StepRule
+) -> SweepResult | None:
     """Sweep on a grid; None where that fails and controlled steps may not."""
     try:
-        return rule.run(compiled, executable, segments)
+        nodes = time_nodes(member, ends)
+        segments = _segments_of(member, nodes, longest_segment(float(ends[-1] - compiled.system.start)))
+        return _at_nodes(member, segments, nodes, ends, rule.run(compiled, member, segments))
     except IntegrationError as error:
         log.info("not on the grid: %s", error)
         return None
@@ -223,8 +239,12 @@ def rule_for(
         ends = check_times(system, times)
         nominal = fill(numbers, forward_mean(compiled, 1e-2 * relative_tolerance))
         segments = _segments_of(nominal, time_nodes(nominal, ends), longest_segment(float(ends[-1] - system.start)))
-        controlled = swept(compiled, nominal, segments, relative_tolerance, steps=False)
-        return step_rule(compiled, nominal, segments, relative_tolerance, controlled.counters["steps"])
+        controlled = swept(compiled, nominal, segments, relative_tolerance, steps=False).counters["steps"]
+        for fills in (True, False) if compiled.fills_means and fill is with_mean_tables else (False,):
+            rule = step_rule(compiled, nominal, segments, relative_tolerance, controlled, fills)
+            if rule is not None:
+                return rule
+        return None
     except AscentwindError:
         return None  # the members say what is wrong
 
@@ -312,14 +332,25 @@ def sweep_member(
     fill : callable
         Of a system and what computes its linear mean, that gives the system with its tables of the mean.
     rule : StepRule, optional
-        As for :func:`sweep`.
+        Of the steps of a grid, instead of steps that the tolerance controls; these follow where the grid fails.
 
     Raises
     ------
     TimeRangeError, DirectNoiseError, IntegrationError, DataError
     """
+    ends = _checked(compiled.system, times, relative_tolerance, responses)
+    # at the start nothing has stepped yet that could fill a table
+    if rule is not None and rule.fills and ends[0] > compiled.system.start:
+        found = _on_grid(compiled, numbers, ends, rule)
+        if found is not None:
+            return found
+        rule = None
     member = fill(numbers, forward_mean(compiled, 1e-2 * relative_tolerance))
-    return sweep(compiled, member, times, relative_tolerance=relative_tolerance, responses=responses, rule=rule)
+    if rule is not None:
+        found = _on_grid(compiled, member, ends, replace(rule, fills=False))
+        if found is not None:
+            return found
+    return sweep(compiled, member, ends, relative_tolerance=relative_tolerance, responses=responses)
 
 
 def batch(
