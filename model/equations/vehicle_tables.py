@@ -19,8 +19,12 @@ MEAN_TABLES: dict[str, tuple[MeanKind, str]] = {
     "mean.engine_angle": ("output", "engine_angle"),
     "mean.attitude": ("state", "attitude"),
 }
+LEAST_KNOTS = 4  # of a piece
 MET_ALTITUDE = "met_altitude"  # of the foremost gust zone; its rate is another table
-MEAN_SPACING = 0.05  # s, of the tables of the mean response
+# of the tables of the mean response, s: after a start or a jump the mean rings as fast as networks and bending do, and
+# what the tables miss there no engine can see, because all read the same
+MEAN_SPACINGS = ((1.0, 0.004), (3.0, 0.008), (8.0, 0.0125))  # until so long after it
+MEAN_SPACING = 0.025  # later
 
 
 def vehicle_tables(vehicle: Vehicle) -> tuple[TableGroup, ...]:
@@ -69,9 +73,13 @@ def met_altitude_name(vehicle: Vehicle) -> str:
 
 def mean_knots(start: float, end: float, discontinuities: Sequence[float]) -> np.ndarray:
     """Return the times (s) at which the mean response is tabulated, discontinuities among them."""
-    edges = [start, *discontinuities, end]
-    pieces = [
-        np.linspace(low, high, max(4, int(np.ceil((high - low) / MEAN_SPACING))) + 1)[:-1]
-        for low, high in pairwise(edges)
-    ]
+    pieces = []
+    for low, high in pairwise([start, *discontinuities, end]):
+        spacings = [(low + until, spacing) for until, spacing in MEAN_SPACINGS if low + until < high]
+        last = MEAN_SPACINGS[len(spacings)][1] if len(spacings) < len(MEAN_SPACINGS) else MEAN_SPACING
+        begin = low
+        for until, spacing in (*spacings, (high, last)):
+            count = max(LEAST_KNOTS, int(np.ceil((until - begin) / spacing - 1e-9)))
+            pieces.append(np.linspace(begin, until, count + 1)[:-1])
+            begin = until
     return np.append(np.concatenate(pieces), end)

@@ -48,7 +48,7 @@ def mean_response(
     ----------
     executable : ExecutableSystem
     times : (k,) array
-        Increasing, the first at the start of the system; those between two discontinuities are equidistant.
+        Increasing, the first at the start of the system; runs of equidistant ones are integrated in one go.
     relative_tolerance : float
 
     Raises
@@ -65,7 +65,7 @@ def mean_response(
     for interval in intervals(executable, float(times[0]), float(times[-1]), pulses=False):
         inside = times[(times > interval.begin) & (times <= interval.end)]
         pieces = []
-        for begin, end, points in _equidistant(interval, inside):
+        for begin, end, points in equidistant(interval, inside):
             parameters = executable.integrator_parameters(begin, end - begin, interval.low, interval.high)
             where = f"of the mean response from {begin:g} s to {end:g} s"
             with naming_fastest_root(executable):
@@ -85,20 +85,18 @@ def mean_response(
     return MeanResponse(times, np.array(states), np.concatenate(outputs))
 
 
-def _equidistant(interval: Interval, inside: NDArray[np.float64]) -> list[tuple[float, float, int]]:
-    """Return begin, end and number of points of what covers an interval: a stop need not be one of the times.
+def equidistant(interval: Interval, inside: NDArray[np.float64]) -> list[tuple[float, float, int]]:
+    """Return begin, end and number of points of what covers an interval, each equidistant, the times among them.
 
-    The first and the last of the times inside bound a piece of their own where they are not in step with the ends.
+    A stop need not be one of the times.
     """
-    if not inside.size:
-        return [(interval.begin, interval.end, 1)]
-    first, last, count = float(inside[0]), float(inside[-1]), inside.size
-    step = (interval.end - interval.begin) / count
-    if abs(first - interval.begin - step) <= IN_STEP * step and last == interval.end:
-        return [(interval.begin, interval.end, count)]
-    found = [(interval.begin, first, 1)]
-    found += [(first, last, count - 1)] if count > 1 else []
-    return found + ([(last, interval.end, 1)] if last < interval.end else [])
+    marks = np.concatenate([[interval.begin], inside])
+    if not inside.size or inside[-1] < interval.end:
+        marks = np.append(marks, interval.end)
+    apart = np.diff(marks)
+    changes = np.flatnonzero(np.abs(np.diff(apart)) > IN_STEP * apart[1:]) + 1
+    edges = [0, *changes.tolist(), apart.size]
+    return [(float(marks[a]), float(marks[b]), b - a) for a, b in pairwise(edges)]
 
 
 Respond = Callable[[ExecutableSystem, NDArray[np.float64]], MeanResponse]

@@ -15,7 +15,7 @@ from ...model.equations.vehicle_tables import mean_knots
 from ...model.errors import DataError
 from ...model.vehicle.vehicle import Vehicle
 from .integration import CvodesSettings, Integrator
-from .mean_response import mean_splines
+from .mean_response import equidistant, mean_splines
 from .time_nodes import intervals
 
 TOLERANCE = 1e-9
@@ -71,7 +71,8 @@ def planar_mean(vehicle: Vehicle, executable: ExecutableSystem) -> PlanarMean:
     for interval in intervals(executable, system.start, system.end, pulses=False):
         inside = knots[(knots > interval.begin) & (knots <= interval.end)]
         # piece by piece, so that a flight that diverges is told before it tumbles
-        for piece in np.split(inside, range(PIECE, inside.size, PIECE)):
+        runs = np.cumsum([points for _, _, points in equidistant(interval, inside)])[:-1]
+        for piece in np.split(inside, np.unique([*runs, *range(PIECE, inside.size, PIECE)]).astype(int)):
             begin = times[-1][-1]
             parameters = np.array([begin, piece[-1] - begin, interval.low, interval.high])
             where = f"of the nonlinear mean response from {begin:g} s to {piece[-1]:g} s"

@@ -16,8 +16,8 @@ from ascentwind.codegen.system.executable import executable_system
 from ascentwind.model.errors import IntegrationError
 from ascentwind.model.system.define import define_system
 from ascentwind.runners.solvers import sweep as sweep_module
-from ascentwind.runners.solvers.fixed_grid import step_rule
-from ascentwind.runners.solvers.sweep import MANY, batch, rule_for, sweep
+from ascentwind.runners.solvers.fixed_grid import StepRule, step_rule
+from ascentwind.runners.solvers.sweep import MANY, batch, forward_mean, rule_for, sweep, sweep_member
 from ascentwind.runners.study import Study
 
 ENDS = np.array([0.5, 1.0, 1.7, 3.0])
@@ -106,20 +106,68 @@ def test_is_of_order_eight():
     assert 7.5 < np.log2(errors[0] / errors[1]) < 8.8
 
 
+@pytest.mark.parametrize("count", [1, 7, 400])
+def test_the_mean_between_steps_is_what_matrix_exponentials_say(count):
+    A, B, C = CASES["stiff"]
+    executable = executable_system(constant(A, B, C, push=0.3))
+    times = np.linspace(0.0, 4.0, count + 1)
+    found = forward_mean(sweep_of(executable), 1e-11)(executable, times)
+    expected = np.array([exact_mean(A, 0.3, np.eye(3), time) for time in times])
+    np.testing.assert_allclose(found.states, expected, atol=1e-9 * np.abs(expected).max())
+    np.testing.assert_allclose(found.outputs, expected @ C.T, atol=1e-9 * np.abs(expected).max())
+
+
+VEHICLES = [
+    ("as504", {}, 24.0, np.array([11.0, 12.0, 40.0, 75.0, 106.0, 107.0, 117.0, 140.0]), 2e-6),
+    ("as504", {"planes": "both"}, 24.0, np.array([11.0, 75.0, 107.0]), 2e-6),
+    ("falcon1", {}, 240.0, np.array([11.0, 12.0, 30.0, 70.0, 107.0]), 3e-5),  # bending at 135 rad/s lasts
+]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "changes", "rate", "ends", "within"), VEHICLES)
+def test_tables_of_the_mean_hold_what_a_sweep_on_a_grid_fills_itself(name, changes, rate, ends, within):
+    """The mean at the stages themselves, against tables of it that everything else reads: by controlled steps here."""
+    study = Study.load(name, changes=changes)
+    numbers, compiled = study.executable, sweep_of(study.executable)
+    assert compiled.fills_means
+    rule = StepRule(np.array([0.0, 200.0]), np.full(2, rate), np.full(2, 1e3), 1e-9, 1e-6, fills=True)
+    found = sweep_member(compiled, numbers, ends, relative_tolerance=1e-6, rule=rule)
+    assert found.counters["rejected"] == 0 and "refined" in found.counters
+    filled = study.mean.fill(numbers, forward_mean(compiled, 1e-9))
+    expected = sweep(compiled, filled, ends, relative_tolerance=1e-8)
+    reached = expected.variance > 0
+    assert np.abs(np.sqrt(found.variance[reached] / expected.variance[reached]) - 1).max() < within
+    assert (np.abs(found.mean - expected.mean) <= 1e-6 * np.abs(expected.mean).max(axis=0)).all()
+
+
+def test_only_the_linear_mean_is_filled_within_the_sweep():
+    study = Study.load("as504")
+    compiled, ends = sweep_of(study.executable), np.array([40.0, 75.0])
+
+    def fill(executable, respond):
+        return study.mean.fill(executable, respond)
+
+    kept = rule_for(compiled, study.executable, ends, relative_tolerance=1e-4, fill=fill)
+    own = rule_for(compiled, study.executable, ends, relative_tolerance=1e-4, fill=study.mean.fill)
+    assert kept is not None and own is not None
+    assert (kept.fills, own.fills) == (False, True)
+
+
 def test_controlled_steps_follow_where_a_grid_fails(monkeypatch):
     executable = executable_system(constant(*CASES["stiff"]))
     compiled = sweep_of(executable)
     rule = rule_for(compiled, executable, ENDS, relative_tolerance=1e-4)
     controlled = sweep(compiled, executable, ENDS, relative_tolerance=1e-4)
     assert rule is not None
-    found = sweep(compiled, executable, ENDS, relative_tolerance=1e-4, rule=rule)
+    found = sweep_member(compiled, executable, ENDS, relative_tolerance=1e-4, rule=rule)
     assert 0 < np.abs(found.variance / controlled.variance - 1).max() < 2e-4
 
     def fails(*_):
         raise IntegrationError("nearly singular")
 
     monkeypatch.setattr(type(rule), "run", fails)
-    again = sweep(compiled, executable, ENDS, relative_tolerance=1e-4, rule=rule)
+    again = sweep_member(compiled, executable, ENDS, relative_tolerance=1e-4, rule=rule)
     np.testing.assert_array_equal(again.variance, controlled.variance)
 
 
@@ -150,7 +198,7 @@ def test_a_member_for_whom_the_grid_is_too_coarse_takes_a_finer_one_and_says_so(
         member = executable.with_numbers(parameters=np.array([w]))
         caplog.clear()
         with caplog.at_level(logging.INFO, logger=sweep_module.__name__.replace("sweep", "fixed_grid")):
-            found = sweep(compiled, member, ends, relative_tolerance=1e-5, rule=rule)
+            found = sweep_member(compiled, member, ends, relative_tolerance=1e-5, rule=rule)
         assert bool(found.counters["refined"]) == finer == ("too coarse" in caplog.text)
         A = oscillator(w, 0.01, 80.0)
         expected = np.array([exact(A, np.eye(3)[0], np.eye(3)[1:2], time)[0, 0] for time in ends[:3]])

@@ -95,7 +95,9 @@ def oscillator_chain(count):
 @pytest.mark.slow
 def test_agrees_with_cvodes_and_the_covariance_equation_at_ten_times(as504, reference):
     engine, executable, _ = as504
-    result = sweep(engine, executable, TEN, relative_tolerance=1e-10)
+    # at 1e-10 thrust at 107 s is 4.6e-9 off, at 1e-11 1.7e-9, at 1e-12 3e-10: kinks at the knots of the tables of the
+    # mean, which rings with the networks just after the gain switch, are not seen by embedded formulas
+    result = sweep(engine, executable, TEN, relative_tolerance=1e-12)
     variance, mean = reference
     np.testing.assert_allclose(np.sqrt(result.variance), np.sqrt(variance), rtol=2e-9)
     deviation = np.sqrt(variance.sum(axis=2))
