@@ -23,7 +23,7 @@
  *   full coupling: false
  *   noise loads: moved_line
  *   states: 31
- *   table lengths: flight 73 x 147, wind 14 x 481, mean 3 x 2802
+ *   table lengths: flight 73 x 147, wind 14 x 481, mean 3 x 7752
  * States x
  *     0  lateral_velocity [m/s], scale 10.0
  *     1  attitude [rad], scale 0.02
@@ -276,7 +276,7 @@ static void lookup(double t, double address, double *v) {
   const double *data = (const double *)(uintptr_t)address;
   lookup_group(t, data + 0, 147, 73, v + 0); /* flight */
   lookup_group(v[3], data + 42779, 481, 14, v + 73); /* wind */
-  lookup_group(t, data + 70140, 2802, 3, v + 87); /* mean */
+  lookup_group(t, data + 70140, 7752, 3, v + 87); /* mean */
 }
 
 /* ---- Arithmetic: flight time t, table values v, parameters p, state x -> results. ---- */

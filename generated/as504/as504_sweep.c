@@ -25,7 +25,7 @@
  *   full coupling: false
  *   noise loads: moved_line
  *   states: 31
- *   table lengths: flight 73 x 147, wind 14 x 481, mean 3 x 2802
+ *   table lengths: flight 73 x 147, wind 14 x 481, mean 3 x 7752
  */
 
 #include <math.h>
@@ -134,7 +134,7 @@ static void lookup_group(double x, const double *data, int knots, int tables, in
 static void lookup(Flight *f, double t, double (*v)[STAGES], int j) {
   lookup_group(t, f->tables + 0, 147, 73, f->piece + 0, v + 0, j); /* flight */
   lookup_group(v[3][j], f->tables + 42779, 481, 14, f->piece + 1, v + 73, j); /* wind */
-  lookup_group(t, f->tables + 70140, 2802, 3, f->piece + 2, v + 87, j); /* mean */
+  lookup_group(t, f->tables + 70140, 7752, 3, f->piece + 2, v + 87, j); /* mean */
 }
 
 static void stage_matrices(const double (*restrict t)[STAGES], const double (*restrict v)[STAGES], const double *restrict p,
@@ -3438,6 +3438,8 @@ EXPORT int sweep(int count, double start, const double *end, const double *low, 
 
 /* ---- The mean alone, forward, at many times ---- */
 
+enum { POINTS = 4, LEAST_IN_PIECE = 4, PASSED = 3 };
+
 /* A x + E u at stage i */
 static void mean_rate(const Matrices *restrict m, const int i, const double *restrict x, double *restrict rate) {
   rate[0] = m->A[0][i] * x[0] + m->A[8][i] * x[1] + m->A[44][i] * x[12] + m->A[55][i] * x[14] + m->A[64][i] * x[15] + m->A[141][i] * x[26] + m->A[151][i] * x[27] + m->A[162][i] * x[28] + m->A[172][i] * x[29];
@@ -3482,16 +3484,64 @@ static void mean_rate(const Matrices *restrict m, const int i, const double *res
   (void)m; (void)i; (void)x;
 }
 
+/* The mean and its rate at the last few steps of a piece of flight between two jumps */
+typedef struct {
+  int count;
+  double t[POINTS], x[POINTS][STATES], rate[POINTS][STATES];
+  double span, node[2 * POINTS], c[2 * POINTS][STATES]; /* of the polynomial through them */
+} Recent;
+
+static void remember(Recent *r, double t, const double *x, const double *rate) {
+  if (r->count == POINTS) {
+    --r->count;
+    memmove(r->t, r->t + 1, r->count * sizeof r->t[0]);
+    memmove(r->x, r->x + 1, r->count * sizeof r->x[0]);
+    memmove(r->rate, r->rate + 1, r->count * sizeof r->rate[0]);
+  }
+  r->t[r->count] = t;
+  memcpy(r->x[r->count], x, sizeof r->x[0]);
+  memcpy(r->rate[r->count++], rate, sizeof r->rate[0]);
+}
+
+/* Newton's form of the polynomial of degree 2 count - 1 through the points and their rates, over time / span */
+static void interpolate(Recent *r) {
+  const int n = 2 * r->count;
+  int i, k, s;
+  r->span = r->t[r->count - 1] - r->t[0];
+  for (k = 0; k < n; ++k) {
+    r->node[k] = (r->t[k / 2] - r->t[0]) / r->span;
+    memcpy(r->c[k], r->x[k / 2], sizeof r->c[k]);
+  }
+  for (i = 1; i < n; ++i)
+    for (k = n - 1; k >= i; --k) {
+      const double close = 1.0 / (r->node[k] - r->node[k - i]);
+      if (i == 1 && k % 2)
+        for (s = 0; s < STATES; ++s) r->c[k][s] = r->span * r->rate[k / 2][s];
+      else
+        for (s = 0; s < STATES; ++s) r->c[k][s] = close * (r->c[k][s] - r->c[k - 1][s]);
+    }
+}
+
+static void polynomial_at(const Recent *restrict r, double t, double *restrict x) {
+  const double u = (t - r->t[0]) / r->span;
+  int j = 2 * r->count - 1, i;
+  memcpy(x, r->c[j], sizeof r->c[j]);
+  while (--j >= 0)
+    for (i = 0; i < STATES; ++i) x[i] = x[i] * (u - r->node[j]) + r->c[j][i];
+}
+
 /* Mean response at `start`, at rest, and at `count` times after it; arguments as for sweep, states (count + 1, STATES),
- * outputs (count + 1, RESPONSES). */
+ * outputs (count + 1, RESPONSES). Steps are as long as the tolerance lets them, past PASSED times at most, so that no
+ * pulse is passed over; between them stands the polynomial of degree 7 through four of their ends. */
 EXPORT int mean_history(int count, double start, const double *end, const double *low, const double *high, const double *p,
                         const double *tables, double tolerance, const double *size, double *states, double *outputs,
                         double *counters, double *failure, const volatile int *stop) {
   double k[STAGES][STATES], x[STATES], y[STATES], next[STATES], largest[STATES], C[C_SIZE], direct[RESPONSES];
   Matrices m;
   Flight f;
+  Recent recent;
   double step = end[0] - start, t = start;
-  int i, n, stage;
+  int i, n = 0, first, last, ahead = 0, stage;
   f.p = p;
   f.tables = tables;
   memset(f.piece, 0, sizeof f.piece);
@@ -3505,21 +3555,43 @@ EXPORT int mean_history(int count, double start, const double *end, const double
   memcpy(states, x, sizeof x);
   evaluate_output(&f, start, C, direct);
   respond(C, direct, x, outputs);
-  for (n = 0; n < count; ++n) {
-    f.low = low[n];
-    f.high = high[n];
-    while (t < end[n]) {
-      const double pieces = larger(1.0, ceil((end[n] - t) / step * (1.0 - 1e-12)));
-      const double h = (end[n] - t) / pieces;
-      double fine = 0.0, coarse = 0.0, error, factor;
+  for (first = 0; first < count; first = last) {
+    const double begin = t;
+    double close;
+    int fresh = 1, over = 0;
+    for (last = first + 1; last < count && low[last] == low[first] && high[last] == high[first]; ++last) {}
+    close = end[last - 1];
+    f.low = low[first];
+    f.high = high[first];
+    recent.count = 0;
+    while (!over) {
+      double most, pieces, h, fine = 0.0, coarse = 0.0, error, factor, until;
       const int many = counters[0] + counters[1] >= MOST_STEPS;
+      over = t >= close;
+      while (!over && end[ahead] <= t) ++ahead;
+      most = over ? 1.0 : smaller(end[ahead + PASSED < last ? ahead + PASSED : last - 1] - t, (close - begin) / LEAST_IN_PIECE);
+      pieces = over ? 1.0 : larger(1.0, ceil((close - t) / smaller(step, most) * (1.0 - 1e-12)));
+      h = (close - t) / pieces;
       if (*stop) return STOPPED;
-      if (many || (pieces > 1.0 && h < larger(1e-10 * (end[n] - (n ? end[n - 1] : start)), 1e-15 * (fabs(t) + fabs(end[n]))))) {
+      if (!over && (many || (pieces > 1.0 && h < larger(1e-10 * (close - begin) / (last - first), 1e-15 * (fabs(t) + fabs(close)))))) {
         failure[0] = t;
         return many ? TOO_MANY_STEPS : TOO_SMALL_A_STEP;
       }
       evaluate_stages(&f, t, h, &m);
       mean_rate(&m, 0, x, k[0]);
+      if (fresh) {
+        remember(&recent, t, x, k[0]);
+        until = over ? close : recent.count == POINTS ? recent.t[POINTS - 2] : t - 1.0;
+        if (n < last && end[n] <= until) interpolate(&recent);
+        for (; n < last && end[n] <= until; ++n) {
+          double *at = states + (n + 1) * STATES;
+          if (end[n] == t) memcpy(at, x, sizeof x); else polynomial_at(&recent, end[n], at);
+          evaluate_output(&f, end[n], C, direct);
+          respond(C, direct, at, outputs + (n + 1) * RESPONSES);
+        }
+        fresh = 0;
+      }
+      if (over) break;
       for (i = 0; i < STATES; ++i) y[i] = x[i] + h * (+ 0.05260015195876773 * k[0][i] );
       mean_rate(&m, 1, y, k[1]);
       for (i = 0; i < STATES; ++i) y[i] = x[i] + h * (+ 0.0197250569845379 * k[0][i] + 0.0591751709536137 * k[1][i] );
@@ -3570,7 +3642,8 @@ EXPORT int mean_history(int count, double start, const double *end, const double
       }
       counters[0] += 1.0;
       step = larger(h * factor, pieces > 1.0 ? 0.0 : step);
-      t = pieces > 1.0 ? t + h : end[n];
+      t = pieces > 1.0 ? t + h : close;
+      fresh = 1;
       for (i = 0; i < STATES; ++i) {
         x[i] = next[i];
         largest[i] = larger(largest[i], fabs(x[i]));
@@ -3580,9 +3653,6 @@ EXPORT int mean_history(int count, double start, const double *end, const double
         }
       }
     }
-    memcpy(states + (n + 1) * STATES, x, sizeof x);
-    evaluate_output(&f, end[n], C, direct);
-    respond(C, direct, x, outputs + (n + 1) * RESPONSES);
   }
   return DONE;
 }
@@ -3596,6 +3666,10 @@ EXPORT int mean_history(int count, double start, const double *end, const double
  * M = I - h (a x I) A of 8 steps is eliminated side by side, without exchanges, by the plan of codegen/nodes/elimination.py
  * for the rows of a kind; then the adjoint goes back step by step: M' V = d a, a at the stages a' V / b, at the start of
  * the step a + sum of V, because the d_i = (b a^-1)_i add up to nothing.
+ *
+ * Before, the mean goes forward through the same factors: M X = x + h a E u, at the end of the step x + sum of d_i X_i.
+ * With `fill`, it gives the values of the tables of the mean at the stages, and what depends on them alone, the noise
+ * matrix and blocks below pivots that have no part in elimination, is written then.
  */
 
 #include <stdlib.h>
@@ -3613,6 +3687,14 @@ static const double gauss_matrix[SQUARE] = { 0.08696371128436346, 0.188118117499
   0.08696371128436373 }; /* a by columns */
 
 typedef double Eight __attribute__((vector_size(LANES * sizeof(double)))); /* of GCC and Clang */
+
+typedef double Four __attribute__((vector_size(GAUSS * sizeof(double))));
+
+static inline Four load_four(const double *from) {
+  Four x;
+  memcpy(&x, from, sizeof x);
+  return x;
+}
 
 static inline Eight load_eight(const double *from) {
   Eight x;
@@ -4015,8 +4097,23 @@ static const int entry_block_0[189] = { 39, 49, 64, 80, 97, 115, 134, 154, 32, 4
   139, 159, 175, 170, 198, 166, 163, 140, 160, 176, 171, 197, 167, 164, 162, 161, 35, 45, 60, 76, 93, 111, 130,
   150, 21, 22, 36, 46, 61, 77, 94, 112, 131, 151, 186, 23, 24, 37, 47, 62, 78, 95, 113, 132, 152, 185, 25, 31, 40,
   51, 67, 84, 102, 121, 141, 0, 41, 52, 68, 85, 103, 122, 142, 1 };
+static const int left_start_0[32] = { 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 3, 7, 7, 7, 7, 7, 16, 16, 16, 16, 16, 17, 18, 22, 30, 40, 55, 71, 88, 106, 125,
+  145 };
+static const int left_state_0[145] = { 3, 4, 5, 7, 8, 9, 10, 3, 4, 5, 7, 8, 9, 10, 6, 11, 26, 27, 13, 1, 14, 15, 29, 1, 14, 15, 26, 27, 28, 12, 29, 30,
+  1, 14, 15, 26, 27, 28, 12, 0, 29, 30, 18, 19, 20, 21, 1, 14, 15, 26, 27, 28, 12, 0, 2, 29, 30, 18, 19, 20, 21,
+  1, 14, 15, 26, 27, 28, 12, 0, 2, 16, 29, 30, 18, 19, 20, 21, 1, 14, 15, 26, 27, 28, 12, 0, 2, 16, 17, 29, 30,
+  18, 19, 20, 21, 1, 14, 15, 26, 27, 28, 12, 0, 2, 16, 17, 22, 29, 30, 18, 19, 20, 21, 1, 14, 15, 26, 27, 28, 12,
+  0, 2, 16, 17, 22, 23, 29, 30, 18, 19, 20, 21, 1, 14, 15, 26, 27, 28, 12, 0, 2, 16, 17, 22, 23, 24 };
+static const int left_block_0[145] = { 2, 3, 4, 6, 7, 8, 9, 11, 12, 13, 14, 15, 16, 17, 18, 19, 22, 24, 26, 27, 28, 29, 31, 32, 33, 34, 35, 36, 37, 38,
+  40, 41, 42, 43, 44, 45, 46, 47, 48, 49, 51, 52, 53, 54, 55, 56, 57, 58, 59, 60, 61, 62, 63, 64, 65, 67, 68, 69,
+  70, 71, 72, 73, 74, 75, 76, 77, 78, 79, 80, 81, 82, 84, 85, 86, 87, 88, 89, 90, 91, 92, 93, 94, 95, 96, 97, 98,
+  99, 100, 102, 103, 104, 105, 106, 107, 108, 109, 110, 111, 112, 113, 114, 115, 116, 117, 118, 119, 121, 122,
+  123, 124, 125, 126, 127, 128, 129, 130, 131, 132, 133, 134, 135, 136, 137, 138, 139, 141, 142, 143, 144, 145,
+  146, 147, 148, 149, 150, 151, 152, 153, 154, 155, 156, 157, 158, 159, 160 };
 static const int right_start_0[32] = { 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 10, 13, 14, 15, 16, 17, 24, 25, 26, 27, 28, 29, 29, 32, 35, 37, 42, 46, 49, 51,
   52, 52 };
+static const int right_state_0[52] = { 4, 5, 6, 8, 9, 10, 11, 1, 14, 15, 2, 16, 17, 22, 23, 24, 25, 1, 2, 12, 14, 15, 16, 17, 2, 16, 17, 27, 28, 2, 16,
+  17, 2, 16, 17, 16, 17, 17, 22, 23, 24, 25, 22, 23, 24, 25, 23, 24, 25, 24, 25, 25 };
 static const int right_block_0[52] = { 213, 212, 211, 210, 209, 208, 207, 204, 205, 206, 201, 202, 203, 200, 199, 198, 197, 190, 191, 192, 193, 194,
   195, 196, 189, 188, 187, 186, 185, 182, 183, 184, 179, 180, 181, 177, 178, 172, 173, 174, 175, 176, 168, 169,
   170, 171, 165, 166, 167, 163, 164, 162 };
@@ -4040,14 +4137,6 @@ static const int below_block_0[145] = { 31, 40, 51, 67, 84, 102, 121, 141, 41, 5
   92, 110, 129, 149, 35, 45, 60, 76, 93, 111, 130, 150, 22, 36, 46, 61, 77, 94, 112, 131, 151, 24, 37, 47, 62, 78,
   95, 113, 132, 152, 38, 48, 63, 79, 96, 114, 133, 153, 49, 64, 80, 97, 115, 134, 154, 65, 81, 98, 116, 135, 155,
   82, 99, 117, 136, 156, 100, 118, 137, 157, 119, 138, 158, 139, 159, 160 };
-static const int entry_0[189] = { 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29,
-  30, 31, 32, 33, 34, 35, 36, 37, 38, 39, 40, 41, 42, 43, 44, 45, 46, 47, 48, 49, 50, 51, 52, 53, 54, 55, 56, 57,
-  58, 59, 60, 61, 62, 63, 64, 65, 66, 67, 68, 69, 70, 71, 72, 73, 74, 75, 76, 77, 78, 79, 80, 81, 82, 83, 84, 85,
-  86, 87, 88, 89, 90, 91, 92, 93, 94, 95, 96, 97, 98, 99, 100, 101, 102, 103, 104, 105, 106, 107, 108, 109, 110,
-  111, 112, 113, 114, 115, 116, 117, 118, 119, 120, 121, 122, 123, 124, 125, 126, 127, 128, 129, 130, 131, 132,
-  133, 134, 135, 136, 137, 138, 139, 140, 141, 142, 143, 144, 145, 146, 147, 148, 149, 150, 151, 152, 153, 154,
-  155, 156, 157, 158, 159, 160, 161, 162, 163, 164, 165, 166, 167, 168, 169, 170, 171, 172, 173, 174, 175, 176,
-  177, 178, 179, 180, 181, 182, 183, 184, 185, 186, 187, 188 };
 static const int target_0[208] = { 3, 12, 4, 13, 5, 18, 7, 15, 8, 16, 9, 17, 10, 19, 190, 193, 194, 191, 195, 196, 173, 168, 101, 119, 138, 158,
   174, 169, 165, 120, 139, 159, 175, 170, 166, 163, 140, 160, 176, 171, 167, 164, 162, 161, 27, 182, 30, 28, 29,
   183, 184, 179, 50, 182, 65, 81, 98, 116, 135, 155, 180, 177, 183, 66, 82, 99, 117, 136, 156, 181, 178, 184, 172,
@@ -4057,6 +4146,14 @@ static const int target_0[208] = { 3, 12, 4, 13, 5, 18, 7, 15, 8, 16, 9, 17, 10,
   100, 117, 118, 136, 137, 156, 157, 83, 168, 169, 170, 171, 100, 101, 165, 166, 167, 118, 119, 120, 163, 164,
   137, 138, 139, 140, 162, 157, 158, 159, 160, 161, 101, 165, 166, 167, 119, 120, 163, 164, 138, 139, 140, 162,
   158, 159, 160, 161, 120, 163, 164, 139, 140, 162, 159, 160, 161, 140, 162, 160, 161, 161 };
+static const int entry_0[189] = { 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29,
+  30, 31, 32, 33, 34, 35, 36, 37, 38, 39, 40, 41, 42, 43, 44, 45, 46, 47, 48, 49, 50, 51, 52, 53, 54, 55, 56, 57,
+  58, 59, 60, 61, 62, 63, 64, 65, 66, 67, 68, 69, 70, 71, 72, 73, 74, 75, 76, 77, 78, 79, 80, 81, 82, 83, 84, 85,
+  86, 87, 88, 89, 90, 91, 92, 93, 94, 95, 96, 97, 98, 99, 100, 101, 102, 103, 104, 105, 106, 107, 108, 109, 110,
+  111, 112, 113, 114, 115, 116, 117, 118, 119, 120, 121, 122, 123, 124, 125, 126, 127, 128, 129, 130, 131, 132,
+  133, 134, 135, 136, 137, 138, 139, 140, 141, 142, 143, 144, 145, 146, 147, 148, 149, 150, 151, 152, 153, 154,
+  155, 156, 157, 158, 159, 160, 161, 162, 163, 164, 165, 166, 167, 168, 169, 170, 171, 172, 173, 174, 175, 176,
+  177, 178, 179, 180, 181, 182, 183, 184, 185, 186, 187, 188 };
 
 static int factorise_0(const Matrices *restrict m, const double *restrict h, Eight *restrict N) {
   const int *target = target_0;
@@ -4086,9 +4183,50 @@ static int factorise_0(const Matrices *restrict m, const double *restrict h, Eig
   return 1;
 }
 
+/* x less the sum of F y over listed blocks */
+static inline Four less_blocks_0(const double *F, const int *block, const int *state, const int first, const int last, double (*X)[GAUSS], Four x) {
+  int l, s;
+  for (l = first; l < last; ++l)
+    for (s = 0; s < GAUSS; ++s) x -= load_four(F + SQUARE * block[l] + GAUSS * s) * X[state[l]][s];
+  return x;
+}
+
+/* One step forward with the mean x of the rows of kind 0; X is what it is at the stages */
+static void mean_on_grid_0(const double *restrict F, const Matrices *restrict m, const double h, const int lane, double *restrict x, double (*restrict X)[GAUSS]) {
+  int i, s;
+  for (i = 0; i < 31; ++i)
+    for (s = 0; s < GAUSS; ++s) X[i][s] = x[i];
+  for (s = 0; s < GAUSS; ++s) {
+    X[0][s] += h * (gauss_matrix[s] * m[0].known[0][lane] + gauss_matrix[GAUSS + s] * m[1].known[0][lane] + gauss_matrix[2 * GAUSS + s] * m[2].known[0][lane] + gauss_matrix[3 * GAUSS + s] * m[3].known[0][lane]);
+    X[2][s] += h * (gauss_matrix[s] * m[0].known[1][lane] + gauss_matrix[GAUSS + s] * m[1].known[1][lane] + gauss_matrix[2 * GAUSS + s] * m[2].known[1][lane] + gauss_matrix[3 * GAUSS + s] * m[3].known[1][lane]);
+    X[16][s] += h * (gauss_matrix[s] * m[0].known[2][lane] + gauss_matrix[GAUSS + s] * m[1].known[2][lane] + gauss_matrix[2 * GAUSS + s] * m[2].known[2][lane] + gauss_matrix[3 * GAUSS + s] * m[3].known[2][lane]);
+    X[17][s] += h * (gauss_matrix[s] * m[0].known[3][lane] + gauss_matrix[GAUSS + s] * m[1].known[3][lane] + gauss_matrix[2 * GAUSS + s] * m[2].known[3][lane] + gauss_matrix[3 * GAUSS + s] * m[3].known[3][lane]);
+    X[22][s] += h * (gauss_matrix[s] * m[0].known[4][lane] + gauss_matrix[GAUSS + s] * m[1].known[4][lane] + gauss_matrix[2 * GAUSS + s] * m[2].known[4][lane] + gauss_matrix[3 * GAUSS + s] * m[3].known[4][lane]);
+    X[23][s] += h * (gauss_matrix[s] * m[0].known[5][lane] + gauss_matrix[GAUSS + s] * m[1].known[5][lane] + gauss_matrix[2 * GAUSS + s] * m[2].known[5][lane] + gauss_matrix[3 * GAUSS + s] * m[3].known[5][lane]);
+    X[24][s] += h * (gauss_matrix[s] * m[0].known[6][lane] + gauss_matrix[GAUSS + s] * m[1].known[6][lane] + gauss_matrix[2 * GAUSS + s] * m[2].known[6][lane] + gauss_matrix[3 * GAUSS + s] * m[3].known[6][lane]);
+    X[25][s] += h * (gauss_matrix[s] * m[0].known[7][lane] + gauss_matrix[GAUSS + s] * m[1].known[7][lane] + gauss_matrix[2 * GAUSS + s] * m[2].known[7][lane] + gauss_matrix[3 * GAUSS + s] * m[3].known[7][lane]);
+  }
+  for (i = 0; i < 31; ++i) {
+    const int own = pivot_0[i], diagonal = diagonal_0[i];
+    Four y = less_blocks_0(F, left_block_0, left_state_0, left_start_0[i], left_start_0[i + 1], X, load_four(X[own]));
+    if (diagonal != UNIT) {
+      const double *f = F + SQUARE * diagonal;
+      y = (load_four(f) * y[0] + load_four(f + GAUSS) * y[1]) + (load_four(f + 2 * GAUSS) * y[2] + load_four(f + 3 * GAUSS) * y[3]);
+    }
+    memcpy(X[own], &y, sizeof y);
+  }
+  for (i = 30; i >= 0; --i) {
+    const int own = pivot_0[i];
+    const Four y = less_blocks_0(F, right_block_0, right_state_0, right_start_0[i], right_start_0[i + 1], X, load_four(X[own]));
+    memcpy(X[own], &y, sizeof y);
+    x[own] += (gauss_end[0] * y[0] + gauss_end[1] * y[1]) + (gauss_end[2] * y[2] + gauss_end[3] * y[3]);
+  }
+  (void)m; (void)h; (void)lane;
+}
+
 /* One step back with columns x of kind 0; F its factors, `lane` its place in m */
 static void step_on_grid_0(const double *restrict F, const Matrices *restrict m, const int lane, double (*restrict x)[32],
-                            double (*restrict X)[GAUSS][32], double (*restrict noise)[GAUSS][COLUMNS], double (*restrict known)[COLUMNS]) {
+                            double (*restrict X)[GAUSS][32], double (*restrict noise)[GAUSS][COLUMNS]) {
   enum { WIDTH = 32 };
   int i, c;
   {
@@ -4107,14 +4245,6 @@ static void step_on_grid_0(const double *restrict F, const Matrices *restrict m,
     const double inverse = 1.0 / gauss_weight[i];
     const double a0 = inverse * gauss_matrix[GAUSS * i], a1 = inverse * gauss_matrix[GAUSS * i + 1], a2 = inverse * gauss_matrix[GAUSS * i + 2], a3 = inverse * gauss_matrix[GAUSS * i + 3];
     for (c = 0; c < WIDTH; ++c) {
-      const double y0 = a0 * X[0][0][c] + a1 * X[0][1][c] + a2 * X[0][2][c] + a3 * X[0][3][c];
-      const double y2 = a0 * X[2][0][c] + a1 * X[2][1][c] + a2 * X[2][2][c] + a3 * X[2][3][c];
-      const double y16 = a0 * X[16][0][c] + a1 * X[16][1][c] + a2 * X[16][2][c] + a3 * X[16][3][c];
-      const double y17 = a0 * X[17][0][c] + a1 * X[17][1][c] + a2 * X[17][2][c] + a3 * X[17][3][c];
-      const double y22 = a0 * X[22][0][c] + a1 * X[22][1][c] + a2 * X[22][2][c] + a3 * X[22][3][c];
-      const double y23 = a0 * X[23][0][c] + a1 * X[23][1][c] + a2 * X[23][2][c] + a3 * X[23][3][c];
-      const double y24 = a0 * X[24][0][c] + a1 * X[24][1][c] + a2 * X[24][2][c] + a3 * X[24][3][c];
-      const double y25 = a0 * X[25][0][c] + a1 * X[25][1][c] + a2 * X[25][2][c] + a3 * X[25][3][c];
       const double y26 = a0 * X[26][0][c] + a1 * X[26][1][c] + a2 * X[26][2][c] + a3 * X[26][3][c];
       const double y27 = a0 * X[27][0][c] + a1 * X[27][1][c] + a2 * X[27][2][c] + a3 * X[27][3][c];
       const double y28 = a0 * X[28][0][c] + a1 * X[28][1][c] + a2 * X[28][2][c] + a3 * X[28][3][c];
@@ -4124,7 +4254,6 @@ static void step_on_grid_0(const double *restrict F, const Matrices *restrict m,
       noise[1][i][0 + c] = m[i].B[1][lane] * y26 + m[i].B[2][lane] * y27;
       noise[2][i][0 + c] = m[i].B[3][lane] * y29;
       noise[3][i][0 + c] = m[i].B[4][lane] * y30;
-      known[i][0 + c] = m[i].known[0][lane] * y0 + m[i].known[1][lane] * y2 + m[i].known[2][lane] * y16 + m[i].known[3][lane] * y17 + m[i].known[4][lane] * y22 + m[i].known[5][lane] * y23 + m[i].known[6][lane] * y24 + m[i].known[7][lane] * y25;
     }
     (void)a0; (void)a1; (void)a2; (void)a3;
   }
@@ -4155,47 +4284,424 @@ static void add_products_on_grid(const double (*restrict noise)[GAUSS][COLUMNS],
     }
 }
 
-/* What a run on a grid needs, too much for the stack of a thread */
+/* What eight steps side by side leave: their matrices and their factors */
 typedef struct {
-  Eight N_0[214 * SQUARE];
   double F_0[SIDE][214 * SQUARE];
-  double x_0[31][32], X_0[31][GAUSS][32];
-  double noise[NOISES_1][GAUSS][COLUMNS], known[GAUSS][COLUMNS];
   double v[GAUSS][TABLE_VALUES_1][STAGES], t[GAUSS][1][STAGES], h[SIDE];
   Matrices m[GAUSS];
+} Together;
+
+/* What a run on a grid needs, too much for the stack of a thread; then the steps of a segment, eight by eight */
+typedef struct {
+  Eight N_0[214 * SQUARE];
+  double x_0[31][32], X_0[31][GAUSS][32];
+  double mean_0[31], stage_mean_0[31][GAUSS];
+  double noise[NOISES_1][GAUSS][COLUMNS];
   Segment g;
 } OnGrid;
 
 /* Evaluate and eliminate `count` steps from edges[0] on, side by side; room that is left repeats the first. */
-static int factorise_steps(Flight *f, const double *edges, const int count, OnGrid *w) {
+static int factorise_steps(Flight *f, const double *edges, const int count, OnGrid *w, Together *e) {
   int i, j, k, n;
   for (j = 0; j < STAGES; ++j) { /* the matrices have room for more than is eliminated */
     const int of = j < count ? j : 0;
-    if (j < SIDE) w->h[j] = edges[of + 1] - edges[of];
+    if (j < SIDE) e->h[j] = edges[of + 1] - edges[of];
     for (i = 0; i < GAUSS; ++i) {
       if (j < count) {
-        w->t[i][0][j] = smaller(larger(edges[j] + gauss_node[i] * (edges[j + 1] - edges[j]), f->low), f->high);
-        lookup(f, w->t[i][0][j], w->v[i], j);
+        e->t[i][0][j] = smaller(larger(edges[j] + gauss_node[i] * (edges[j + 1] - edges[j]), f->low), f->high);
+        lookup(f, e->t[i][0][j], e->v[i], j);
       } else {
-        w->t[i][0][j] = w->t[i][0][0];
-        for (k = 0; k < TABLE_VALUES; ++k) w->v[i][k][j] = w->v[i][k][0];
+        e->t[i][0][j] = e->t[i][0][0];
+        for (k = 0; k < TABLE_VALUES; ++k) e->v[i][k][j] = e->v[i][k][0];
       }
     }
   }
   for (i = 0; i < GAUSS; ++i)
-    stage_matrices((const double (*)[STAGES])w->t[i], (const double (*)[STAGES])w->v[i], f->p, w->m[i].A, w->m[i].B, w->m[i].known);
-  if (!factorise_0(w->m, w->h, w->N_0)) return 0;
-  for (n = 0; n < 214 * SQUARE; n += LANES) transpose_eight(w->N_0 + n, w->F_0[0] + n, 214 * SQUARE);
+    stage_matrices((const double (*)[STAGES])e->t[i], (const double (*)[STAGES])e->v[i], f->p, e->m[i].A, e->m[i].B, e->m[i].known);
+  if (!factorise_0(e->m, e->h, w->N_0)) return 0;
+  for (n = 0; n < 214 * SQUARE; n += LANES) transpose_eight(w->N_0 + n, e->F_0[0] + n, 214 * SQUARE);
   return 1;
 }
 
-static int segment_on_grid(Flight *f, const double *edges, const int steps, OnGrid *w, Counters *done, Failure *why, const volatile int *stop) {
+/* C and G u of the outputs that tables of the mean hold */
+static void outputs_of_mean(const double (*restrict t)[STAGES], const double (*restrict v)[STAGES], const double *restrict p,
+                            double (*restrict C)[STAGES], double (*restrict direct)[STAGES]) {
+  int j;
+  (void)t; (void)v; (void)p; (void)C; (void)direct;
+  for (j = 0; j < STAGES; ++j) {
+    const double a0 = 1.0 / v[V_relative_velocity][j];
+    const double a1 = -a0;
+    C[0][j] = a1;
+    C[1][j] = 1.0;
+    const double a2 = p[P_control_T3_numerator_s0] / p[P_control_T3_denominator_s2];
+    const double a3 = p[P_control_T3_denominator_s0] / p[P_control_T3_denominator_s2];
+    const double a4 = fabs(a3);
+    const double a5 = a2 / a4;
+    const double a6 = a5 * p[P_control_T3_gain];
+    C[2][j] = a6;
+    C[3][j] = v[V_bending_1_slope_at_gimbal][j];
+    C[4][j] = v[V_bending_2_slope_at_gimbal][j];
+    const double a7 = p[P_wind_sigma_scale] / v[V_relative_velocity][j];
+    const double a8 = v[V_wind_filter_H_1_1][j] * a7;
+    C[5][j] = a8;
+    const double a9 = v[V_wind_filter_H_1_2][j] * a7;
+    C[6][j] = a9;
+    const double a10 = v[V_wind_filter_H_1_3][j] * a7;
+    C[7][j] = a10;
+    const double a11 = p[P_wind_mean_scale] * v[V_wind_mean][j];
+    const double a12 = a11 / v[V_relative_velocity][j];
+    direct[0][j] = a12;
+    direct[1][j] = 0.0;
+  }
+}
+
+/* What depends on tables of the mean: entries of A in the order of late_entry, and B */
+static void waiting_matrices(const double (*restrict t)[STAGES], const double (*restrict v)[STAGES], const double *restrict p,
+                             double (*restrict late)[STAGES], double (*restrict B)[STAGES]) {
+  int j;
+  (void)t; (void)v; (void)p; (void)late; (void)B;
+  for (j = 0; j < STAGES; ++j) {
+    const double a0 = v[V_mean_attitude][j] * v[V_thrust][j];
+    const double a1 = a0 / v[V_mass][j];
+    const double a2 = v[V_mean_engine_angle][j] * v[V_control_thrust][j];
+    const double a3 = a2 / v[V_mass][j];
+    const double a4 = a1 + a3;
+    const double a5 = a4 * p[P_thrust_sigma];
+    late[0][j] = a5;
+    const double a6 = v[V_center_of_gravity][j] * v[V_control_thrust][j];
+    const double a7 = v[V_mean_engine_angle][j] * a6;
+    const double a8 = a7 / v[V_moment_of_inertia][j];
+    const double a9 = a8 * p[P_thrust_sigma];
+    const double a10 = -a9;
+    late[1][j] = a10;
+    const double a11 = v[V_bending_1_displacement_at_sic_lox][j] * v[V_slosh_sic_lox_mass][j];
+    const double a12 = a11 * a1;
+    const double a13 = v[V_bending_1_displacement_at_sic_rp1][j] * v[V_slosh_sic_rp1_mass][j];
+    const double a14 = a13 * a1;
+    const double a15 = a12 + a14;
+    const double a16 = v[V_bending_1_displacement_at_sii_lox][j] * v[V_slosh_sii_lox_mass][j];
+    const double a17 = a16 * a1;
+    const double a18 = a15 + a17;
+    const double a19 = v[V_bending_1_displacement_at_sivb_lox][j] * v[V_slosh_sivb_lox_mass][j];
+    const double a20 = a19 * a1;
+    const double a21 = a18 + a20;
+    const double a22 = a11 * v[V_bending_1_displacement_at_sic_lox][j];
+    const double a23 = a13 * v[V_bending_1_displacement_at_sic_rp1][j];
+    const double a24 = a22 + a23;
+    const double a25 = a16 * v[V_bending_1_displacement_at_sii_lox][j];
+    const double a26 = a24 + a25;
+    const double a27 = a19 * v[V_bending_1_displacement_at_sivb_lox][j];
+    const double a28 = a26 + a27;
+    const double a29 = v[V_bending_1_generalized_mass][j] - a28;
+    const double a30 = a21 / a29;
+    const double a31 = v[V_bending_2_displacement_at_sic_lox][j] * v[V_slosh_sic_lox_mass][j];
+    const double a32 = a31 * v[V_bending_1_displacement_at_sic_lox][j];
+    const double a33 = v[V_bending_2_displacement_at_sic_rp1][j] * v[V_slosh_sic_rp1_mass][j];
+    const double a34 = a33 * v[V_bending_1_displacement_at_sic_rp1][j];
+    const double a35 = a32 + a34;
+    const double a36 = v[V_bending_2_displacement_at_sii_lox][j] * v[V_slosh_sii_lox_mass][j];
+    const double a37 = a36 * v[V_bending_1_displacement_at_sii_lox][j];
+    const double a38 = a35 + a37;
+    const double a39 = v[V_bending_2_displacement_at_sivb_lox][j] * v[V_slosh_sivb_lox_mass][j];
+    const double a40 = a39 * v[V_bending_1_displacement_at_sivb_lox][j];
+    const double a41 = a38 + a40;
+    const double a42 = a41 / a29;
+    const double a43 = a31 * a1;
+    const double a44 = a33 * a1;
+    const double a45 = a43 + a44;
+    const double a46 = a36 * a1;
+    const double a47 = a45 + a46;
+    const double a48 = a39 * a1;
+    const double a49 = a47 + a48;
+    const double a50 = a42 * a21;
+    const double a51 = a49 + a50;
+    const double a52 = a31 * v[V_bending_2_displacement_at_sic_lox][j];
+    const double a53 = a33 * v[V_bending_2_displacement_at_sic_rp1][j];
+    const double a54 = a52 + a53;
+    const double a55 = a36 * v[V_bending_2_displacement_at_sii_lox][j];
+    const double a56 = a54 + a55;
+    const double a57 = a39 * v[V_bending_2_displacement_at_sivb_lox][j];
+    const double a58 = a56 + a57;
+    const double a59 = v[V_bending_2_generalized_mass][j] - a58;
+    const double a60 = a42 * a42;
+    const double a61 = a60 * a29;
+    const double a62 = a59 - a61;
+    const double a63 = a51 / a62;
+    const double a64 = a42 * a63;
+    const double a65 = a30 + a64;
+    const double a66 = v[V_bending_1_displacement_at_gimbal][j] * v[V_control_thrust][j];
+    const double a67 = v[V_mean_engine_angle][j] * a66;
+    const double a68 = v[V_slosh_sic_lox_attach_point][j] - v[V_center_of_gravity][j];
+    const double a69 = a68 * a8;
+    const double a70 = a3 - a69;
+    const double a71 = a11 * a70;
+    const double a72 = v[V_slosh_sic_rp1_attach_point][j] - v[V_center_of_gravity][j];
+    const double a73 = a72 * a8;
+    const double a74 = a3 - a73;
+    const double a75 = a13 * a74;
+    const double a76 = a71 + a75;
+    const double a77 = v[V_slosh_sii_lox_attach_point][j] - v[V_center_of_gravity][j];
+    const double a78 = a77 * a8;
+    const double a79 = a3 - a78;
+    const double a80 = a16 * a79;
+    const double a81 = a76 + a80;
+    const double a82 = v[V_slosh_sivb_lox_attach_point][j] - v[V_center_of_gravity][j];
+    const double a83 = a82 * a8;
+    const double a84 = a3 - a83;
+    const double a85 = a19 * a84;
+    const double a86 = a81 + a85;
+    const double a87 = a67 + a86;
+    const double a88 = a87 / a29;
+    const double a89 = v[V_bending_2_displacement_at_gimbal][j] * v[V_control_thrust][j];
+    const double a90 = v[V_mean_engine_angle][j] * a89;
+    const double a91 = a31 * a70;
+    const double a92 = a33 * a74;
+    const double a93 = a91 + a92;
+    const double a94 = a36 * a79;
+    const double a95 = a93 + a94;
+    const double a96 = a39 * a84;
+    const double a97 = a95 + a96;
+    const double a98 = a90 + a97;
+    const double a99 = a42 * a87;
+    const double a100 = a98 + a99;
+    const double a101 = a100 / a62;
+    const double a102 = a42 * a101;
+    const double a103 = a88 + a102;
+    const double a104 = a65 + a103;
+    const double a105 = a104 * p[P_thrust_sigma];
+    late[2][j] = a105;
+    const double a106 = a63 + a101;
+    const double a107 = a106 * p[P_thrust_sigma];
+    late[3][j] = a107;
+    const double a108 = v[V_bending_1_displacement_at_sic_lox][j] * a65;
+    const double a109 = v[V_bending_2_displacement_at_sic_lox][j] * a63;
+    const double a110 = a108 + a109;
+    const double a111 = a1 + a110;
+    const double a112 = v[V_bending_1_displacement_at_sic_lox][j] * a103;
+    const double a113 = v[V_bending_2_displacement_at_sic_lox][j] * a101;
+    const double a114 = a112 + a113;
+    const double a115 = a70 + a114;
+    const double a116 = a111 + a115;
+    const double a117 = a116 * p[P_thrust_sigma];
+    const double a118 = -a117;
+    late[4][j] = a118;
+    const double a119 = v[V_bending_1_displacement_at_sic_rp1][j] * a65;
+    const double a120 = v[V_bending_2_displacement_at_sic_rp1][j] * a63;
+    const double a121 = a119 + a120;
+    const double a122 = a1 + a121;
+    const double a123 = v[V_bending_1_displacement_at_sic_rp1][j] * a103;
+    const double a124 = v[V_bending_2_displacement_at_sic_rp1][j] * a101;
+    const double a125 = a123 + a124;
+    const double a126 = a74 + a125;
+    const double a127 = a122 + a126;
+    const double a128 = a127 * p[P_thrust_sigma];
+    const double a129 = -a128;
+    late[5][j] = a129;
+    const double a130 = v[V_bending_1_displacement_at_sii_lox][j] * a65;
+    const double a131 = v[V_bending_2_displacement_at_sii_lox][j] * a63;
+    const double a132 = a130 + a131;
+    const double a133 = a1 + a132;
+    const double a134 = v[V_bending_1_displacement_at_sii_lox][j] * a103;
+    const double a135 = v[V_bending_2_displacement_at_sii_lox][j] * a101;
+    const double a136 = a134 + a135;
+    const double a137 = a79 + a136;
+    const double a138 = a133 + a137;
+    const double a139 = a138 * p[P_thrust_sigma];
+    const double a140 = -a139;
+    late[6][j] = a140;
+    const double a141 = v[V_bending_1_displacement_at_sivb_lox][j] * a65;
+    const double a142 = v[V_bending_2_displacement_at_sivb_lox][j] * a63;
+    const double a143 = a141 + a142;
+    const double a144 = a1 + a143;
+    const double a145 = v[V_bending_1_displacement_at_sivb_lox][j] * a103;
+    const double a146 = v[V_bending_2_displacement_at_sivb_lox][j] * a101;
+    const double a147 = a145 + a146;
+    const double a148 = a84 + a147;
+    const double a149 = a144 + a148;
+    const double a150 = a149 * p[P_thrust_sigma];
+    const double a151 = -a150;
+    late[7][j] = a151;
+    const double a152 = v[V_dynamic_pressure][j] * p[P_reference_area];
+    const double a153 = a152 * v[V_normal_force_slope][j];
+    const double a154 = a153 * v[V_center_of_pressure][j];
+    const double a155 = v[V_mean_angle_of_attack][j] * a154;
+    const double a156 = a155 / v[V_moment_of_inertia][j];
+    const double a157 = a156 * p[P_center_of_pressure_sigma];
+    late[8][j] = a157;
+    const double a158 = a68 * a156;
+    const double a159 = a11 * a158;
+    const double a160 = a72 * a156;
+    const double a161 = a13 * a160;
+    const double a162 = a159 + a161;
+    const double a163 = a77 * a156;
+    const double a164 = a16 * a163;
+    const double a165 = a162 + a164;
+    const double a166 = a82 * a156;
+    const double a167 = a19 * a166;
+    const double a168 = a165 + a167;
+    const double a169 = a168 / a29;
+    const double a170 = a31 * a158;
+    const double a171 = a33 * a160;
+    const double a172 = a170 + a171;
+    const double a173 = a36 * a163;
+    const double a174 = a172 + a173;
+    const double a175 = a39 * a166;
+    const double a176 = a174 + a175;
+    const double a177 = a42 * a168;
+    const double a178 = a176 + a177;
+    const double a179 = a178 / a62;
+    const double a180 = a42 * a179;
+    const double a181 = a169 + a180;
+    const double a182 = a152 * v[V_bending_1_normal_force_slope_times_slope][j];
+    const double a183 = a182 * v[V_mean_angle_of_attack][j];
+    const double a184 = a183 * v[V_center_of_pressure][j];
+    const double a185 = a184 / a29;
+    const double a186 = a152 * v[V_bending_2_normal_force_slope_times_slope][j];
+    const double a187 = a186 * v[V_mean_angle_of_attack][j];
+    const double a188 = a187 * v[V_center_of_pressure][j];
+    const double a189 = a42 * a184;
+    const double a190 = a188 + a189;
+    const double a191 = a190 / a62;
+    const double a192 = a42 * a191;
+    const double a193 = a185 + a192;
+    const double a194 = a181 + a193;
+    const double a195 = a194 * p[P_center_of_pressure_sigma];
+    late[9][j] = a195;
+    const double a196 = a179 + a191;
+    const double a197 = a196 * p[P_center_of_pressure_sigma];
+    late[10][j] = a197;
+    const double a198 = v[V_bending_1_displacement_at_sic_lox][j] * a181;
+    const double a199 = v[V_bending_2_displacement_at_sic_lox][j] * a179;
+    const double a200 = a198 + a199;
+    const double a201 = a158 + a200;
+    const double a202 = v[V_bending_1_displacement_at_sic_lox][j] * a193;
+    const double a203 = v[V_bending_2_displacement_at_sic_lox][j] * a191;
+    const double a204 = a202 + a203;
+    const double a205 = a201 + a204;
+    const double a206 = a205 * p[P_center_of_pressure_sigma];
+    const double a207 = -a206;
+    late[11][j] = a207;
+    const double a208 = v[V_bending_1_displacement_at_sic_rp1][j] * a181;
+    const double a209 = v[V_bending_2_displacement_at_sic_rp1][j] * a179;
+    const double a210 = a208 + a209;
+    const double a211 = a160 + a210;
+    const double a212 = v[V_bending_1_displacement_at_sic_rp1][j] * a193;
+    const double a213 = v[V_bending_2_displacement_at_sic_rp1][j] * a191;
+    const double a214 = a212 + a213;
+    const double a215 = a211 + a214;
+    const double a216 = a215 * p[P_center_of_pressure_sigma];
+    const double a217 = -a216;
+    late[12][j] = a217;
+    const double a218 = v[V_bending_1_displacement_at_sii_lox][j] * a181;
+    const double a219 = v[V_bending_2_displacement_at_sii_lox][j] * a179;
+    const double a220 = a218 + a219;
+    const double a221 = a163 + a220;
+    const double a222 = v[V_bending_1_displacement_at_sii_lox][j] * a193;
+    const double a223 = v[V_bending_2_displacement_at_sii_lox][j] * a191;
+    const double a224 = a222 + a223;
+    const double a225 = a221 + a224;
+    const double a226 = a225 * p[P_center_of_pressure_sigma];
+    const double a227 = -a226;
+    late[13][j] = a227;
+    const double a228 = v[V_bending_1_displacement_at_sivb_lox][j] * a181;
+    const double a229 = v[V_bending_2_displacement_at_sivb_lox][j] * a179;
+    const double a230 = a228 + a229;
+    const double a231 = a166 + a230;
+    const double a232 = v[V_bending_1_displacement_at_sivb_lox][j] * a193;
+    const double a233 = v[V_bending_2_displacement_at_sivb_lox][j] * a191;
+    const double a234 = a232 + a233;
+    const double a235 = a231 + a234;
+    const double a236 = a235 * p[P_center_of_pressure_sigma];
+    const double a237 = -a236;
+    late[14][j] = a237;
+    const double a238 = sqrt(v[V_altitude_rate][j]);
+    const double a239 = a238 * v[V_wind_filter_G_3_1][j];
+    B[0][j] = a239;
+    const double a240 = a238 * v[V_wind_filter_G_1_2][j];
+    B[1][j] = a240;
+    const double a241 = a238 * v[V_wind_filter_G_2_2][j];
+    B[2][j] = a241;
+    const double a242 = 2.0 / p[P_thrust_correlation_time];
+    const double a243 = sqrt(a242);
+    B[3][j] = a243;
+    const double a244 = 2.0 / p[P_center_of_pressure_correlation_time];
+    const double a245 = sqrt(a244);
+    B[4][j] = a245;
+  }
+}
+
+enum { LATE = 15 };
+static const int late_entry[15] = { 172, 173, 174, 175, 176, 177, 178, 179, 181, 182, 183, 184, 185, 186, 187 };
+static const int late_place_0[15][2] = { { 0, 31 }, { 1, 40 }, { 2, 51 }, { 3, 67 }, { 4, 84 }, { 5, 102 }, { 6, 121 }, { 7, 141 }, { 8, 41 }, { 9, 52 }, { 10, 68 }, { 11, 85 }, { 12, 103 }, { 13, 122 }, { 14, 142 } }; /* number in late_entry, block */
+
+/* Carry the mean over steps; with `fill` its tables have their values of it then, and what waited for them is written. */
+static void carry_mean_on_grid(Flight *f, const int count, OnGrid *w, Together *e, const int fill) {
+  double C[GAUSS][8][STAGES], direct[GAUSS][2][STAGES], late[15][STAGES];
+  int i, k, l, s;
+  int j;
+  for (i = 0; i < GAUSS && fill; ++i) outputs_of_mean((const double (*)[STAGES])e->t[i], (const double (*)[STAGES])e->v[i], f->p, C[i], direct[i]);
+  for (j = 0; j < count; ++j) {
+    mean_on_grid_0(e->F_0[j], e->m, e->h[j], j, w->mean_0, w->stage_mean_0);
+    for (i = 0; i < GAUSS && fill; ++i) {
+      e->v[i][87][j] = direct[i][0][j] + C[i][0][j] * w->stage_mean_0[0][i] + C[i][1][j] * w->stage_mean_0[1][i] + C[i][5][j] * w->stage_mean_0[26][i] + C[i][6][j] * w->stage_mean_0[27][i] + C[i][7][j] * w->stage_mean_0[28][i];
+      e->v[i][88][j] = direct[i][1][j] + C[i][2][j] * w->stage_mean_0[12][i] + C[i][3][j] * w->stage_mean_0[14][i] + C[i][4][j] * w->stage_mean_0[15][i];
+      e->v[i][89][j] = w->stage_mean_0[1][i];
+    }
+  }
+  for (i = 0; i < GAUSS && fill; ++i) {
+    waiting_matrices((const double (*)[STAGES])e->t[i], (const double (*)[STAGES])e->v[i], f->p, late, e->m[i].B);
+    for (k = 0; k < LATE; ++k) memcpy(e->m[i].A[late_entry[k]], late[k], sizeof late[k]);
+    for (l = 0; l < 15; ++l)
+      for (j = 0; j < count; ++j) {
+        double *block = e->F_0[j] + SQUARE * late_place_0[l][1] + GAUSS * i;
+        for (s = 0; s < GAUSS; ++s) block[s] = -e->h[j] * late[late_place_0[l][0]][j] * gauss_matrix[GAUSS * i + s];
+      }
+  }
+  (void)f; (void)fill;
+}
+
+/* C and G u at the end of a segment, where the mean is `m` */
+static void evaluate_output_on_grid(Flight *f, double t, const double *m, double *C, double *direct, const int fill) {
+  double v[TABLE_VALUES_1][STAGES], value[TABLE_VALUES_1], y[RESPONSES];
+  int i;
+  if (fill) {
+    t = smaller(larger(t, f->low), f->high);
+    lookup(f, t, v, 0);
+    for (i = 0; i < TABLE_VALUES; ++i) value[i] = v[i][0];
+    output(&t, value, f->p, C, direct);
+    respond(C, direct, m, y);
+    value[87] = y[1];
+    value[88] = y[2];
+    value[89] = m[1];
+    output(&t, value, f->p, C, direct);
+    return;
+  }
+  (void)m; (void)fill;
+  evaluate_output(f, t, C, direct);
+}
+
+/* Return whether a time and an entry were found that are not finite. */
+static int told_not_finite(const Together *e, Failure *why) {
+  int i, j;
+  for (i = 0; i < GAUSS; ++i) {
+    const int entry = not_finite(e->m + i, &j);
+    if (entry >= 0) {
+      why->time = e->t[i][0][j];
+      why->entry = entry;
+      return 1;
+    }
+  }
+  return 0;
+}
+
+/* One segment back, after its mean went forward from m, which is at its end then. */
+static int segment_on_grid(Flight *f, const double *edges, const int steps, OnGrid *w, Together *of, double *m, const int fill,
+                           Counters *done, Failure *why, const volatile int *stop) {
   Segment *g = &w->g;
   int i, j, k, last, first;
   double sum = 0.0;
   memset(g, 0, sizeof *g);
   memset(w->noise, 0, sizeof w->noise);
-  memset(w->known, 0, sizeof w->known);
   memset(w->x_0, 0, sizeof w->x_0);
   w->x_0[0][0] = 1.0;
   w->x_0[1][1] = 1.0;
@@ -4228,30 +4734,25 @@ static int segment_on_grid(Flight *f, const double *edges, const int steps, OnGr
   w->x_0[28][28] = 1.0;
   w->x_0[29][29] = 1.0;
   w->x_0[30][30] = 1.0;
-  for (last = steps; last > 0; last = first) {
-    first = last > SIDE ? last - SIDE : 0;
+  for (i = 0; i < 31; ++i) w->mean_0[i] = m[row_0[i]];
+  for (first = 0; first < steps; first = last) {
+    Together *e = of + first / SIDE;
+    last = first + SIDE < steps ? first + SIDE : steps;
     if (*stop) return STOPPED;
     why->time = edges[first];
-    if (!factorise_steps(f, edges + first, last - first, w)) {
-      for (i = 0; i < GAUSS; ++i) {
-        const int entry = not_finite(w->m + i, &j);
-        if (entry >= 0) {
-          why->time = w->t[i][0][j];
-          why->entry = entry;
-          return NOT_FINITE;
-        }
-      }
-      return NEARLY_SINGULAR;
-    }
+    if (!factorise_steps(f, edges + first, last - first, w, e)) return told_not_finite(e, why) ? NOT_FINITE : NEARLY_SINGULAR;
+    carry_mean_on_grid(f, last - first, w, e, fill);
     done->evaluations += GAUSS * (last - first);
     done->steps += last - first;
-    for (j = last - first - 1; j >= 0; --j) {
-      step_on_grid_0(w->F_0[j], w->m, j, w->x_0, w->X_0, w->noise, w->known);
-      for (i = 0; i < PRODUCTS; ++i)
-        add_products_on_grid((const double (*)[GAUSS][COLUMNS])w->noise, w->h[j], g->W[noise_source[product[i][0]]], product[i]);
-      for (i = 0; i < GAUSS; ++i)
-        for (k = 0; k < COLUMNS; ++k) g->z[k] += w->h[j] * gauss_weight[i] * w->known[i][k];
-    }
+  }
+  for (i = 0; i < 31; ++i) m[row_0[i]] = w->mean_0[i];
+  for (k = steps - 1; k >= 0; --k) {
+    const Together *e = of + k / SIDE;
+    j = k % SIDE;
+    if (*stop) return STOPPED;
+    step_on_grid_0(e->F_0[j], e->m, j, w->x_0, w->X_0, w->noise);
+    for (i = 0; i < PRODUCTS; ++i)
+      add_products_on_grid((const double (*)[GAUSS][COLUMNS])w->noise, e->h[j], g->W[noise_source[product[i][0]]], product[i]);
   }
   for (i = 0; i < 31; ++i) memcpy(g->transposed[row_0[i]] + 0 * LANES, w->x_0[i], sizeof w->x_0[i]);
   for (k = 0; k < SOURCES; ++k)
@@ -4259,21 +4760,33 @@ static int segment_on_grid(Flight *f, const double *edges, const int steps, OnGr
       for (j = 0; j < i; ++j) g->W[k][i][j] = g->W[k][j][i];
   for (i = 0; i < STATES; ++i)
     for (j = 0; j < COLUMNS; ++j) sum += fabs(g->transposed[i][j]);
-  return isfinite(sum) ? DONE : OUT_OF_RANGE;
+  if (isfinite(sum)) return DONE;
+  for (k = 0; k < steps; k += SIDE)
+    if (told_not_finite(of + k / SIDE, why)) return NOT_FINITE;
+  return OUT_OF_RANGE;
 }
 
-/* Sweep over `count` segments of which number k has steps[k] steps between `edges`; the rest as of sweep. */
+static int most_steps(const int *steps, const int count) {
+  int k, most = 1;
+  for (k = 0; k < count; ++k) most = steps[k] > most ? steps[k] : most;
+  return most;
+}
+
+/* Sweep over `count` segments of which number k has steps[k] steps between `edges`, filling the tables of the mean with
+ * `fill`; the rest as of sweep. */
 EXPORT int sweep_on_grid(int count, const double *end, const double *low, const double *high, const int *steps, const double *edges,
-                         const double *p, const double *tables, double *start_P, double *m, double *covariance, double *mean,
+                         int fill, const double *p, const double *tables, double *start_P, double *m, double *covariance, double *mean,
                          double *transition, double *added, double *counters, double *failure, const volatile int *stop) {
-  double C[C_SIZE], direct[RESPONSES], next[STATES], P[SOURCES_1][COLUMNS][COLUMNS], P_next[SOURCES_1][COLUMNS][COLUMNS];
+  double C[C_SIZE], direct[RESPONSES], P[SOURCES_1][COLUMNS][COLUMNS], P_next[SOURCES_1][COLUMNS][COLUMNS];
   double inherited[SOURCES_1 * RESPONSES];
+  const int most = most_steps(steps, count);
   void *room = malloc(sizeof(OnGrid) + LANES * sizeof(double)); /* vectors want to stand on a multiple of their size */
+  Together *of = (Together *)malloc((most + SIDE - 1) / SIDE * sizeof(Together));
   OnGrid *w = (OnGrid *)(((size_t)room + LANES * sizeof(double) - 1) / (LANES * sizeof(double)) * (LANES * sizeof(double)));
   Flight f;
   Counters done = { 0.0, 0.0, 0.0 };
   Failure why = { 0.0, -1.0 };
-  int i, j, s, k, code = room ? DONE : NEARLY_SINGULAR;
+  int i, j, s, k, code = room && of ? DONE : NEARLY_SINGULAR;
   f.p = p;
   f.tables = tables;
   memset(f.piece, 0, sizeof f.piece);
@@ -4285,10 +4798,10 @@ EXPORT int sweep_on_grid(int count, const double *end, const double *low, const 
     double *result = covariance + k * SOURCES * RESPONSES * RESPONSES;
     f.low = low[k];
     f.high = high[k];
-    code = segment_on_grid(&f, edges, steps[k], w, &done, &why, stop);
+    code = segment_on_grid(&f, edges, steps[k], w, of, m, fill, &done, &why, stop);
     edges += steps[k];
     if (code != DONE) break;
-    evaluate_output(&f, end[k], C, direct);
+    evaluate_output_on_grid(&f, end[k], m, C, direct, fill);
     forward(&w->g, C, (const double (*)[COLUMNS][COLUMNS])P, P_next, result, inherited);
     memcpy(P, P_next, sizeof P);
     for (i = 0; i < SOURCES * RESPONSES * RESPONSES; ++i)
@@ -4296,8 +4809,6 @@ EXPORT int sweep_on_grid(int count, const double *end, const double *low, const 
         why.time = end[k];
         code = OUT_OF_RANGE;
       }
-    carry_mean(&w->g, m, next);
-    memcpy(m, next, sizeof next);
     respond(C, direct, m, mean + k * RESPONSES);
     for (i = 0; i < RESPONSES; ++i)
       if (!(fabs(mean[k * RESPONSES + i]) <= 1e200)) {
@@ -4316,6 +4827,7 @@ EXPORT int sweep_on_grid(int count, const double *end, const double *low, const 
     for (i = 0; i < STATES; ++i)
       for (j = 0; j < STATES; ++j) start_P[(s * STATES + i) * STATES + j] = P[s][i][j];
   free(room);
+  free(of);
   counters[0] = done.steps;
   counters[1] = done.rejected;
   counters[2] = done.evaluations;

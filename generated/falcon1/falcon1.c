@@ -25,7 +25,7 @@
  *   full coupling: false
  *   noise loads: moved_line
  *   states: 35
- *   table lengths: flight 131 x 146, wind 15 x 493, mean 3 x 2901
+ *   table lengths: flight 131 x 146, wind 15 x 493, mean 3 x 6381
  * States x
  *     0  lateral_velocity [m/s], scale 10.0
  *     1  attitude [rad], scale 0.02
@@ -353,7 +353,7 @@ static void lookup(double t, double address, double *v) {
   const double *data = (const double *)(uintptr_t)address;
   lookup_group(t, data + 0, 146, 131, v + 0); /* flight */
   lookup_group(v[129], data + 76126, 493, 15, v + 131); /* wind */
-  lookup_group(t, data + 106139, 2901, 3, v + 146); /* mean */
+  lookup_group(t, data + 106139, 6381, 3, v + 146); /* mean */
 }
 
 /* ---- Arithmetic: flight time t, table values v, parameters p, state x -> results. ---- */

@@ -27,7 +27,7 @@
  *   full coupling: false
  *   noise loads: moved_line
  *   states: 35
- *   table lengths: flight 131 x 146, wind 15 x 493, mean 3 x 2901
+ *   table lengths: flight 131 x 146, wind 15 x 493, mean 3 x 6381
  */
 
 #include <math.h>
@@ -153,7 +153,7 @@ static void lookup_group(double x, const double *data, int knots, int tables, in
 static void lookup(Flight *f, double t, double (*v)[STAGES], int j) {
   lookup_group(t, f->tables + 0, 146, 131, f->piece + 0, v + 0, j); /* flight */
   lookup_group(v[129][j], f->tables + 76126, 493, 15, f->piece + 1, v + 131, j); /* wind */
-  lookup_group(t, f->tables + 106139, 2901, 3, f->piece + 2, v + 146, j); /* mean */
+  lookup_group(t, f->tables + 106139, 6381, 3, f->piece + 2, v + 146, j); /* mean */
 }
 
 static void stage_matrices(const double (*restrict t)[STAGES], const double (*restrict v)[STAGES], const double *restrict p,
@@ -5434,6 +5434,8 @@ EXPORT int sweep(int count, double start, const double *end, const double *low, 
 
 /* ---- The mean alone, forward, at many times ---- */
 
+enum { POINTS = 4, LEAST_IN_PIECE = 4, PASSED = 3 };
+
 /* A x + E u at stage i */
 static void mean_rate(const Matrices *restrict m, const int i, const double *restrict x, double *restrict rate) {
   rate[0] = m->A[0][i] * x[0] + m->A[7][i] * x[1] + m->A[25][i] * x[7] + m->A[35][i] * x[9] + m->A[43][i] * x[10] + m->A[98][i] * x[19] + m->A[110][i] * x[21] + m->A[122][i] * x[23] + m->A[134][i] * x[25] + m->A[144][i] * x[27] + m->A[155][i] * x[28] + m->A[167][i] * x[29] + m->A[178][i] * x[30] + m->A[189][i] * x[31] + m->A[201][i] * x[32] + m->A[211][i] * x[33];
@@ -5483,16 +5485,64 @@ static void mean_rate(const Matrices *restrict m, const int i, const double *res
   (void)m; (void)i; (void)x;
 }
 
+/* The mean and its rate at the last few steps of a piece of flight between two jumps */
+typedef struct {
+  int count;
+  double t[POINTS], x[POINTS][STATES], rate[POINTS][STATES];
+  double span, node[2 * POINTS], c[2 * POINTS][STATES]; /* of the polynomial through them */
+} Recent;
+
+static void remember(Recent *r, double t, const double *x, const double *rate) {
+  if (r->count == POINTS) {
+    --r->count;
+    memmove(r->t, r->t + 1, r->count * sizeof r->t[0]);
+    memmove(r->x, r->x + 1, r->count * sizeof r->x[0]);
+    memmove(r->rate, r->rate + 1, r->count * sizeof r->rate[0]);
+  }
+  r->t[r->count] = t;
+  memcpy(r->x[r->count], x, sizeof r->x[0]);
+  memcpy(r->rate[r->count++], rate, sizeof r->rate[0]);
+}
+
+/* Newton's form of the polynomial of degree 2 count - 1 through the points and their rates, over time / span */
+static void interpolate(Recent *r) {
+  const int n = 2 * r->count;
+  int i, k, s;
+  r->span = r->t[r->count - 1] - r->t[0];
+  for (k = 0; k < n; ++k) {
+    r->node[k] = (r->t[k / 2] - r->t[0]) / r->span;
+    memcpy(r->c[k], r->x[k / 2], sizeof r->c[k]);
+  }
+  for (i = 1; i < n; ++i)
+    for (k = n - 1; k >= i; --k) {
+      const double close = 1.0 / (r->node[k] - r->node[k - i]);
+      if (i == 1 && k % 2)
+        for (s = 0; s < STATES; ++s) r->c[k][s] = r->span * r->rate[k / 2][s];
+      else
+        for (s = 0; s < STATES; ++s) r->c[k][s] = close * (r->c[k][s] - r->c[k - 1][s]);
+    }
+}
+
+static void polynomial_at(const Recent *restrict r, double t, double *restrict x) {
+  const double u = (t - r->t[0]) / r->span;
+  int j = 2 * r->count - 1, i;
+  memcpy(x, r->c[j], sizeof r->c[j]);
+  while (--j >= 0)
+    for (i = 0; i < STATES; ++i) x[i] = x[i] * (u - r->node[j]) + r->c[j][i];
+}
+
 /* Mean response at `start`, at rest, and at `count` times after it; arguments as for sweep, states (count + 1, STATES),
- * outputs (count + 1, RESPONSES). */
+ * outputs (count + 1, RESPONSES). Steps are as long as the tolerance lets them, past PASSED times at most, so that no
+ * pulse is passed over; between them stands the polynomial of degree 7 through four of their ends. */
 EXPORT int mean_history(int count, double start, const double *end, const double *low, const double *high, const double *p,
                         const double *tables, double tolerance, const double *size, double *states, double *outputs,
                         double *counters, double *failure, const volatile int *stop) {
   double k[STAGES][STATES], x[STATES], y[STATES], next[STATES], largest[STATES], C[C_SIZE], direct[RESPONSES];
   Matrices m;
   Flight f;
+  Recent recent;
   double step = end[0] - start, t = start;
-  int i, n, stage;
+  int i, n = 0, first, last, ahead = 0, stage;
   f.p = p;
   f.tables = tables;
   memset(f.piece, 0, sizeof f.piece);
@@ -5506,21 +5556,43 @@ EXPORT int mean_history(int count, double start, const double *end, const double
   memcpy(states, x, sizeof x);
   evaluate_output(&f, start, C, direct);
   respond(C, direct, x, outputs);
-  for (n = 0; n < count; ++n) {
-    f.low = low[n];
-    f.high = high[n];
-    while (t < end[n]) {
-      const double pieces = larger(1.0, ceil((end[n] - t) / step * (1.0 - 1e-12)));
-      const double h = (end[n] - t) / pieces;
-      double fine = 0.0, coarse = 0.0, error, factor;
+  for (first = 0; first < count; first = last) {
+    const double begin = t;
+    double close;
+    int fresh = 1, over = 0;
+    for (last = first + 1; last < count && low[last] == low[first] && high[last] == high[first]; ++last) {}
+    close = end[last - 1];
+    f.low = low[first];
+    f.high = high[first];
+    recent.count = 0;
+    while (!over) {
+      double most, pieces, h, fine = 0.0, coarse = 0.0, error, factor, until;
       const int many = counters[0] + counters[1] >= MOST_STEPS;
+      over = t >= close;
+      while (!over && end[ahead] <= t) ++ahead;
+      most = over ? 1.0 : smaller(end[ahead + PASSED < last ? ahead + PASSED : last - 1] - t, (close - begin) / LEAST_IN_PIECE);
+      pieces = over ? 1.0 : larger(1.0, ceil((close - t) / smaller(step, most) * (1.0 - 1e-12)));
+      h = (close - t) / pieces;
       if (*stop) return STOPPED;
-      if (many || (pieces > 1.0 && h < larger(1e-10 * (end[n] - (n ? end[n - 1] : start)), 1e-15 * (fabs(t) + fabs(end[n]))))) {
+      if (!over && (many || (pieces > 1.0 && h < larger(1e-10 * (close - begin) / (last - first), 1e-15 * (fabs(t) + fabs(close)))))) {
         failure[0] = t;
         return many ? TOO_MANY_STEPS : TOO_SMALL_A_STEP;
       }
       evaluate_stages(&f, t, h, &m);
       mean_rate(&m, 0, x, k[0]);
+      if (fresh) {
+        remember(&recent, t, x, k[0]);
+        until = over ? close : recent.count == POINTS ? recent.t[POINTS - 2] : t - 1.0;
+        if (n < last && end[n] <= until) interpolate(&recent);
+        for (; n < last && end[n] <= until; ++n) {
+          double *at = states + (n + 1) * STATES;
+          if (end[n] == t) memcpy(at, x, sizeof x); else polynomial_at(&recent, end[n], at);
+          evaluate_output(&f, end[n], C, direct);
+          respond(C, direct, at, outputs + (n + 1) * RESPONSES);
+        }
+        fresh = 0;
+      }
+      if (over) break;
       for (i = 0; i < STATES; ++i) y[i] = x[i] + h * (+ 0.05260015195876773 * k[0][i] );
       mean_rate(&m, 1, y, k[1]);
       for (i = 0; i < STATES; ++i) y[i] = x[i] + h * (+ 0.0197250569845379 * k[0][i] + 0.0591751709536137 * k[1][i] );
@@ -5571,7 +5643,8 @@ EXPORT int mean_history(int count, double start, const double *end, const double
       }
       counters[0] += 1.0;
       step = larger(h * factor, pieces > 1.0 ? 0.0 : step);
-      t = pieces > 1.0 ? t + h : end[n];
+      t = pieces > 1.0 ? t + h : close;
+      fresh = 1;
       for (i = 0; i < STATES; ++i) {
         x[i] = next[i];
         largest[i] = larger(largest[i], fabs(x[i]));
@@ -5581,9 +5654,6 @@ EXPORT int mean_history(int count, double start, const double *end, const double
         }
       }
     }
-    memcpy(states + (n + 1) * STATES, x, sizeof x);
-    evaluate_output(&f, end[n], C, direct);
-    respond(C, direct, x, outputs + (n + 1) * RESPONSES);
   }
   return DONE;
 }
@@ -5597,6 +5667,10 @@ EXPORT int mean_history(int count, double start, const double *end, const double
  * M = I - h (a x I) A of 8 steps is eliminated side by side, without exchanges, by the plan of codegen/nodes/elimination.py
  * for the rows of a kind; then the adjoint goes back step by step: M' V = d a, a at the stages a' V / b, at the start of
  * the step a + sum of V, because the d_i = (b a^-1)_i add up to nothing.
+ *
+ * Before, the mean goes forward through the same factors: M X = x + h a E u, at the end of the step x + sum of d_i X_i.
+ * With `fill`, it gives the values of the tables of the mean at the stages, and what depends on them alone, the noise
+ * matrix and blocks below pivots that have no part in elimination, is written then.
  */
 
 #include <stdlib.h>
@@ -5614,6 +5688,14 @@ static const double gauss_matrix[SQUARE] = { 0.08696371128436346, 0.188118117499
   0.08696371128436373 }; /* a by columns */
 
 typedef double Eight __attribute__((vector_size(LANES * sizeof(double)))); /* of GCC and Clang */
+
+typedef double Four __attribute__((vector_size(GAUSS * sizeof(double))));
+
+static inline Four load_four(const double *from) {
+  Four x;
+  memcpy(&x, from, sizeof x);
+  return x;
+}
 
 static inline Eight load_eight(const double *from) {
   Eight x;
@@ -6041,47 +6123,73 @@ static inline void multiply_blocks(const Eight *restrict below, const Eight *rig
 }
 
 /* Kind 0: 35 states, 252 blocks */
-static const int pivot_0[35] = { 33, 34, 3, 5, 22, 24, 26, 4, 6, 13, 14, 15, 8, 20, 25, 23, 21, 1, 9, 10, 27, 28, 29, 30, 31, 32, 19, 7, 0, 2,
+static const int pivot_0[35] = { 33, 34, 3, 5, 22, 24, 26, 4, 6, 13, 14, 15, 25, 23, 21, 8, 20, 1, 9, 10, 27, 28, 29, 30, 31, 32, 19, 7, 0, 2,
   11, 12, 16, 17, 18 };
-static const int diagonal_0[35] = { 0, 1, -1, -1, -1, -1, -1, 3, 5, -1, -1, -1, 10, -1, 12, 14, 16, -1, -1, -1, 17, 19, 21, -1, 23, 26, 34, 39, 55,
+static const int diagonal_0[35] = { 0, 1, -1, -1, -1, -1, -1, 3, 5, -1, -1, -1, 7, 9, 11, 16, -1, -1, -1, -1, 17, 19, 21, -1, 23, 26, 34, 39, 55,
   73, 95, 118, 142, 167, 193 };
-static const int entry_block_0[226] = { 55, 72, 93, 115, 138, 162, 187, 44, 61, 241, 82, 104, 127, 151, 176, 217, 238, 2, 6, 251, 3, 4, 7, 250, 5, 54,
-  71, 230, 92, 114, 137, 161, 186, 35, 10, 45, 62, 242, 83, 105, 128, 152, 177, 46, 63, 243, 84, 106, 129, 153,
+static const int entry_block_0[226] = { 55, 72, 93, 115, 138, 162, 187, 44, 61, 241, 82, 104, 127, 151, 176, 217, 238, 2, 12, 251, 3, 4, 13, 250, 5, 54,
+  71, 227, 92, 114, 137, 161, 186, 35, 16, 45, 62, 242, 83, 105, 128, 152, 177, 46, 63, 243, 84, 106, 129, 153,
   178, 239, 216, 95, 117, 140, 164, 189, 240, 215, 200, 118, 141, 165, 190, 76, 98, 121, 145, 170, 77, 99, 122,
   146, 171, 78, 100, 123, 147, 172, 201, 197, 237, 142, 166, 191, 202, 198, 236, 195, 167, 192, 203, 199, 235,
-  196, 194, 193, 53, 70, 91, 113, 136, 160, 185, 34, 221, 218, 248, 27, 43, 60, 81, 103, 126, 150, 175, 16, 249,
-  219, 246, 15, 42, 59, 80, 102, 125, 149, 174, 14, 247, 220, 244, 13, 41, 58, 79, 101, 124, 148, 173, 12, 245,
-  11, 47, 64, 85, 107, 130, 154, 179, 28, 222, 17, 18, 48, 65, 86, 108, 131, 155, 180, 29, 223, 214, 19, 20, 49,
-  66, 87, 109, 132, 156, 181, 30, 224, 213, 21, 50, 67, 88, 110, 133, 157, 182, 31, 225, 22, 24, 51, 68, 89, 111,
-  134, 158, 183, 32, 226, 212, 23, 25, 52, 69, 90, 112, 135, 159, 184, 33, 227, 26, 40, 56, 74, 96, 119, 143, 168,
-  0, 57, 75, 97, 120, 144, 169, 1 };
-static const int right_start_0[36] = { 0, 0, 0, 1, 2, 4, 6, 8, 11, 14, 15, 16, 17, 24, 31, 32, 33, 34, 35, 36, 37, 38, 39, 39, 40, 40, 40, 40, 43, 46,
+  196, 194, 193, 53, 70, 91, 113, 136, 160, 185, 34, 218, 232, 248, 27, 43, 60, 81, 103, 126, 150, 175, 11, 249,
+  233, 246, 10, 42, 59, 80, 102, 125, 149, 174, 9, 247, 234, 244, 8, 41, 58, 79, 101, 124, 148, 173, 7, 245, 6,
+  47, 64, 85, 107, 130, 154, 179, 28, 219, 17, 18, 48, 65, 86, 108, 131, 155, 180, 29, 220, 214, 19, 20, 49, 66,
+  87, 109, 132, 156, 181, 30, 221, 213, 21, 50, 67, 88, 110, 133, 157, 182, 31, 222, 22, 24, 51, 68, 89, 111, 134,
+  158, 183, 32, 223, 212, 23, 25, 52, 69, 90, 112, 135, 159, 184, 33, 224, 26, 40, 56, 74, 96, 119, 143, 168, 0,
+  57, 75, 97, 120, 144, 169, 1 };
+static const int left_start_0[36] = { 0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 2, 2, 2, 3, 4, 5, 9, 9, 9, 9, 9, 9, 10, 11, 11, 12, 14, 21, 25, 40, 57, 78, 100,
+  123, 147, 172 };
+static const int left_state_0[172] = { 3, 5, 26, 24, 22, 3, 5, 4, 6, 27, 28, 30, 30, 31, 20, 27, 28, 29, 30, 31, 32, 8, 1, 9, 10, 33, 25, 23, 21, 1, 9,
+  10, 27, 28, 29, 30, 31, 32, 19, 7, 33, 34, 25, 23, 21, 1, 9, 10, 27, 28, 29, 30, 31, 32, 19, 7, 0, 33, 34, 13,
+  14, 15, 25, 23, 21, 1, 9, 10, 27, 28, 29, 30, 31, 32, 19, 7, 0, 2, 33, 34, 13, 14, 15, 25, 23, 21, 1, 9, 10, 27,
+  28, 29, 30, 31, 32, 19, 7, 0, 2, 11, 33, 34, 13, 14, 15, 25, 23, 21, 1, 9, 10, 27, 28, 29, 30, 31, 32, 19, 7, 0,
+  2, 11, 12, 33, 34, 13, 14, 15, 25, 23, 21, 1, 9, 10, 27, 28, 29, 30, 31, 32, 19, 7, 0, 2, 11, 12, 16, 33, 34,
+  13, 14, 15, 25, 23, 21, 1, 9, 10, 27, 28, 29, 30, 31, 32, 19, 7, 0, 2, 11, 12, 16, 17 };
+static const int left_block_0[172] = { 2, 4, 6, 8, 10, 12, 13, 14, 15, 18, 20, 22, 24, 25, 27, 28, 29, 30, 31, 32, 33, 35, 36, 37, 38, 40, 41, 42, 43,
+  44, 45, 46, 47, 48, 49, 50, 51, 52, 53, 54, 56, 57, 58, 59, 60, 61, 62, 63, 64, 65, 66, 67, 68, 69, 70, 71, 72,
+  74, 75, 76, 77, 78, 79, 80, 81, 82, 83, 84, 85, 86, 87, 88, 89, 90, 91, 92, 93, 94, 96, 97, 98, 99, 100, 101,
+  102, 103, 104, 105, 106, 107, 108, 109, 110, 111, 112, 113, 114, 115, 116, 117, 119, 120, 121, 122, 123, 124,
+  125, 126, 127, 128, 129, 130, 131, 132, 133, 134, 135, 136, 137, 138, 139, 140, 141, 143, 144, 145, 146, 147,
+  148, 149, 150, 151, 152, 153, 154, 155, 156, 157, 158, 159, 160, 161, 162, 163, 164, 165, 166, 168, 169, 170,
+  171, 172, 173, 174, 175, 176, 177, 178, 179, 180, 181, 182, 183, 184, 185, 186, 187, 188, 189, 190, 191, 192 };
+static const int right_start_0[36] = { 0, 0, 0, 1, 2, 4, 6, 8, 11, 14, 15, 16, 17, 18, 19, 20, 27, 34, 35, 36, 37, 38, 39, 39, 40, 40, 40, 40, 43, 46,
   48, 52, 55, 57, 58, 58 };
-static const int right_block_0[58] = { 251, 250, 248, 249, 246, 247, 244, 245, 241, 242, 243, 238, 239, 240, 237, 236, 235, 228, 229, 230, 231, 232,
-  233, 234, 221, 222, 223, 224, 225, 226, 227, 220, 219, 218, 217, 216, 215, 214, 213, 212, 209, 210, 211, 206,
+static const int right_state_0[58] = { 4, 6, 19, 21, 21, 23, 23, 25, 1, 9, 10, 2, 11, 12, 16, 17, 18, 23, 21, 19, 1, 2, 7, 9, 10, 11, 12, 19, 27, 28,
+  29, 30, 31, 32, 2, 11, 12, 28, 29, 31, 2, 11, 12, 2, 11, 12, 11, 12, 12, 16, 17, 18, 16, 17, 18, 17, 18, 18 };
+static const int right_block_0[58] = { 251, 250, 248, 249, 246, 247, 244, 245, 241, 242, 243, 238, 239, 240, 237, 236, 235, 234, 233, 232, 225, 226,
+  227, 228, 229, 230, 231, 218, 219, 220, 221, 222, 223, 224, 217, 216, 215, 214, 213, 212, 209, 210, 211, 206,
   207, 208, 204, 205, 200, 201, 202, 203, 197, 198, 199, 195, 196, 194 };
-static const int above_start_0[36] = { 0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 2, 2, 2, 2, 2, 3, 6, 9, 11, 13, 15, 16, 18, 20, 21, 23, 24, 27, 28, 28, 33, 39,
+static const int above_start_0[36] = { 0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 2, 2, 2, 3, 6, 9, 9, 9, 11, 13, 15, 16, 18, 20, 21, 23, 24, 27, 28, 28, 33, 39,
   46, 49, 53, 58 };
-static const int above_state_0[58] = { 3, 5, 26, 24, 26, 25, 22, 24, 23, 4, 8, 4, 8, 4, 8, 20, 20, 27, 20, 28, 20, 20, 30, 20, 22, 20, 21, 8, 6, 8, 1,
+static const int above_state_0[58] = { 3, 5, 26, 24, 26, 25, 22, 24, 23, 4, 8, 4, 8, 4, 8, 20, 20, 27, 20, 28, 20, 20, 30, 20, 22, 21, 20, 8, 6, 8, 1,
   7, 0, 6, 8, 9, 7, 0, 2, 6, 8, 10, 7, 0, 2, 11, 13, 11, 12, 14, 11, 12, 16, 15, 11, 12, 16, 17 };
-static const int above_block_0[58] = { 251, 250, 245, 247, 244, 220, 249, 246, 219, 241, 228, 242, 231, 243, 232, 222, 223, 214, 224, 213, 225, 226,
-  212, 227, 248, 221, 218, 230, 238, 229, 217, 209, 206, 239, 233, 216, 210, 207, 204, 240, 234, 215, 211, 208,
+static const int above_block_0[58] = { 251, 250, 245, 247, 244, 234, 249, 246, 233, 241, 225, 242, 228, 243, 229, 219, 220, 214, 221, 213, 222, 223,
+  212, 224, 248, 232, 218, 227, 238, 226, 217, 209, 206, 239, 230, 216, 210, 207, 204, 240, 231, 215, 211, 208,
   205, 200, 237, 201, 197, 236, 202, 198, 195, 235, 203, 199, 196, 194 };
-static const int below_start_0[36] = { 0, 7, 13, 15, 17, 18, 19, 20, 21, 22, 27, 32, 37, 38, 39, 46, 53, 60, 68, 76, 84, 93, 102, 110, 120, 129, 137,
+static const int below_start_0[36] = { 0, 7, 13, 15, 17, 18, 19, 20, 21, 22, 27, 32, 37, 44, 51, 58, 59, 60, 68, 76, 84, 93, 102, 110, 120, 129, 137,
   144, 151, 157, 162, 166, 169, 171, 172, 172 };
 static const int below_state_0[172] = { 0, 2, 11, 12, 16, 17, 18, 2, 11, 12, 16, 17, 18, 4, 8, 6, 8, 21, 23, 25, 8, 8, 11, 12, 16, 17, 18, 11, 12, 16,
-  17, 18, 11, 12, 16, 17, 18, 7, 19, 0, 2, 11, 12, 16, 17, 18, 0, 2, 11, 12, 16, 17, 18, 0, 2, 11, 12, 16, 17, 18,
+  17, 18, 11, 12, 16, 17, 18, 0, 2, 11, 12, 16, 17, 18, 0, 2, 11, 12, 16, 17, 18, 0, 2, 11, 12, 16, 17, 18, 7, 19,
   0, 2, 7, 11, 12, 16, 17, 18, 0, 2, 7, 11, 12, 16, 17, 18, 0, 2, 7, 11, 12, 16, 17, 18, 0, 2, 11, 12, 16, 17, 18,
   19, 28, 0, 2, 11, 12, 16, 17, 18, 19, 29, 0, 2, 11, 12, 16, 17, 18, 19, 0, 2, 11, 12, 16, 17, 18, 19, 31, 32, 0,
   2, 11, 12, 16, 17, 18, 19, 32, 0, 2, 11, 12, 16, 17, 18, 19, 0, 2, 11, 12, 16, 17, 18, 0, 2, 11, 12, 16, 17, 18,
   2, 11, 12, 16, 17, 18, 11, 12, 16, 17, 18, 12, 16, 17, 18, 16, 17, 18, 17, 18, 18 };
-static const int below_block_0[172] = { 40, 56, 74, 96, 119, 143, 168, 57, 75, 97, 120, 144, 169, 2, 6, 4, 7, 15, 13, 11, 8, 9, 76, 98, 121, 145, 170,
-  77, 99, 122, 146, 171, 78, 100, 123, 147, 172, 35, 27, 41, 58, 79, 101, 124, 148, 173, 42, 59, 80, 102, 125,
-  149, 174, 43, 60, 81, 103, 126, 150, 175, 44, 61, 36, 82, 104, 127, 151, 176, 45, 62, 37, 83, 105, 128, 152,
-  177, 46, 63, 38, 84, 106, 129, 153, 178, 47, 64, 85, 107, 130, 154, 179, 28, 18, 48, 65, 86, 108, 131, 155, 180,
-  29, 20, 49, 66, 87, 109, 132, 156, 181, 30, 50, 67, 88, 110, 133, 157, 182, 31, 22, 24, 51, 68, 89, 111, 134,
-  158, 183, 32, 25, 52, 69, 90, 112, 135, 159, 184, 33, 53, 70, 91, 113, 136, 160, 185, 54, 71, 92, 114, 137, 161,
-  186, 72, 93, 115, 138, 162, 187, 94, 116, 139, 163, 188, 117, 140, 164, 189, 141, 165, 190, 166, 191, 192 };
+static const int below_block_0[172] = { 40, 56, 74, 96, 119, 143, 168, 57, 75, 97, 120, 144, 169, 2, 12, 4, 13, 10, 8, 6, 14, 15, 76, 98, 121, 145, 170,
+  77, 99, 122, 146, 171, 78, 100, 123, 147, 172, 41, 58, 79, 101, 124, 148, 173, 42, 59, 80, 102, 125, 149, 174,
+  43, 60, 81, 103, 126, 150, 175, 35, 27, 44, 61, 36, 82, 104, 127, 151, 176, 45, 62, 37, 83, 105, 128, 152, 177,
+  46, 63, 38, 84, 106, 129, 153, 178, 47, 64, 85, 107, 130, 154, 179, 28, 18, 48, 65, 86, 108, 131, 155, 180, 29,
+  20, 49, 66, 87, 109, 132, 156, 181, 30, 50, 67, 88, 110, 133, 157, 182, 31, 22, 24, 51, 68, 89, 111, 134, 158,
+  183, 32, 25, 52, 69, 90, 112, 135, 159, 184, 33, 53, 70, 91, 113, 136, 160, 185, 54, 71, 92, 114, 137, 161, 186,
+  72, 93, 115, 138, 162, 187, 94, 116, 139, 163, 188, 117, 140, 164, 189, 141, 165, 190, 166, 191, 192 };
+static const int target_0[197] = { 3, 14, 5, 15, 232, 11, 233, 9, 234, 7, 225, 228, 229, 226, 230, 231, 201, 197, 142, 166, 191, 202, 198, 195,
+  167, 192, 203, 199, 196, 194, 193, 42, 59, 80, 102, 125, 149, 174, 43, 60, 81, 103, 126, 150, 175, 53, 70, 91,
+  113, 136, 160, 185, 36, 209, 39, 37, 38, 210, 211, 34, 28, 29, 30, 31, 32, 33, 206, 73, 209, 94, 116, 139, 163,
+  188, 207, 204, 210, 95, 117, 140, 164, 189, 208, 205, 211, 200, 118, 141, 165, 190, 48, 65, 86, 108, 131, 155,
+  180, 29, 19, 49, 66, 87, 109, 132, 156, 181, 30, 21, 51, 68, 89, 111, 134, 158, 183, 32, 23, 25, 206, 207, 208,
+  73, 204, 205, 94, 95, 200, 116, 117, 118, 139, 140, 141, 163, 164, 165, 188, 189, 190, 73, 204, 205, 94, 95,
+  200, 116, 117, 118, 139, 140, 141, 163, 164, 165, 188, 189, 190, 95, 200, 117, 118, 140, 141, 164, 165, 189,
+  190, 118, 197, 198, 199, 141, 142, 195, 196, 165, 166, 167, 194, 190, 191, 192, 193, 142, 195, 196, 166, 167,
+  194, 191, 192, 193, 167, 194, 192, 193, 193 };
 static const int entry_0[226] = { 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29,
   30, 31, 32, 33, 34, 35, 36, 37, 38, 39, 40, 41, 42, 43, 44, 45, 46, 47, 48, 49, 50, 51, 52, 53, 54, 55, 56, 57,
   58, 59, 60, 61, 62, 63, 64, 65, 66, 67, 68, 69, 70, 71, 72, 73, 74, 75, 76, 77, 78, 79, 80, 81, 82, 83, 84, 85,
@@ -6092,15 +6200,6 @@ static const int entry_0[226] = { 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 
   177, 178, 179, 180, 181, 182, 183, 184, 185, 186, 187, 188, 189, 190, 191, 192, 193, 194, 195, 196, 197, 198,
   199, 200, 201, 202, 203, 204, 205, 206, 207, 208, 209, 210, 211, 212, 213, 214, 215, 216, 217, 218, 219, 220,
   221, 222, 223, 224, 225 };
-static const int target_0[197] = { 3, 8, 5, 9, 218, 16, 219, 14, 220, 12, 228, 231, 232, 229, 233, 234, 201, 197, 142, 166, 191, 202, 198, 195,
-  167, 192, 203, 199, 196, 194, 193, 36, 209, 39, 37, 38, 210, 211, 34, 28, 29, 30, 31, 32, 33, 42, 59, 80, 102,
-  125, 149, 174, 43, 60, 81, 103, 126, 150, 175, 53, 70, 91, 113, 136, 160, 185, 206, 73, 209, 94, 116, 139, 163,
-  188, 207, 204, 210, 95, 117, 140, 164, 189, 208, 205, 211, 200, 118, 141, 165, 190, 48, 65, 86, 108, 131, 155,
-  180, 29, 19, 49, 66, 87, 109, 132, 156, 181, 30, 21, 51, 68, 89, 111, 134, 158, 183, 32, 23, 25, 206, 207, 208,
-  73, 204, 205, 94, 95, 200, 116, 117, 118, 139, 140, 141, 163, 164, 165, 188, 189, 190, 73, 204, 205, 94, 95,
-  200, 116, 117, 118, 139, 140, 141, 163, 164, 165, 188, 189, 190, 95, 200, 117, 118, 140, 141, 164, 165, 189,
-  190, 118, 197, 198, 199, 141, 142, 195, 196, 165, 166, 167, 194, 190, 191, 192, 193, 142, 195, 196, 166, 167,
-  194, 191, 192, 193, 167, 194, 192, 193, 193 };
 
 static int factorise_0(const Matrices *restrict m, const double *restrict h, Eight *restrict N) {
   const int *target = target_0;
@@ -6130,9 +6229,51 @@ static int factorise_0(const Matrices *restrict m, const double *restrict h, Eig
   return 1;
 }
 
+/* x less the sum of F y over listed blocks */
+static inline Four less_blocks_0(const double *F, const int *block, const int *state, const int first, const int last, double (*X)[GAUSS], Four x) {
+  int l, s;
+  for (l = first; l < last; ++l)
+    for (s = 0; s < GAUSS; ++s) x -= load_four(F + SQUARE * block[l] + GAUSS * s) * X[state[l]][s];
+  return x;
+}
+
+/* One step forward with the mean x of the rows of kind 0; X is what it is at the stages */
+static void mean_on_grid_0(const double *restrict F, const Matrices *restrict m, const double h, const int lane, double *restrict x, double (*restrict X)[GAUSS]) {
+  int i, s;
+  for (i = 0; i < 35; ++i)
+    for (s = 0; s < GAUSS; ++s) X[i][s] = x[i];
+  for (s = 0; s < GAUSS; ++s) {
+    X[0][s] += h * (gauss_matrix[s] * m[0].known[0][lane] + gauss_matrix[GAUSS + s] * m[1].known[0][lane] + gauss_matrix[2 * GAUSS + s] * m[2].known[0][lane] + gauss_matrix[3 * GAUSS + s] * m[3].known[0][lane]);
+    X[2][s] += h * (gauss_matrix[s] * m[0].known[1][lane] + gauss_matrix[GAUSS + s] * m[1].known[1][lane] + gauss_matrix[2 * GAUSS + s] * m[2].known[1][lane] + gauss_matrix[3 * GAUSS + s] * m[3].known[1][lane]);
+    X[11][s] += h * (gauss_matrix[s] * m[0].known[2][lane] + gauss_matrix[GAUSS + s] * m[1].known[2][lane] + gauss_matrix[2 * GAUSS + s] * m[2].known[2][lane] + gauss_matrix[3 * GAUSS + s] * m[3].known[2][lane]);
+    X[12][s] += h * (gauss_matrix[s] * m[0].known[3][lane] + gauss_matrix[GAUSS + s] * m[1].known[3][lane] + gauss_matrix[2 * GAUSS + s] * m[2].known[3][lane] + gauss_matrix[3 * GAUSS + s] * m[3].known[3][lane]);
+    X[16][s] += h * (gauss_matrix[s] * m[0].known[4][lane] + gauss_matrix[GAUSS + s] * m[1].known[4][lane] + gauss_matrix[2 * GAUSS + s] * m[2].known[4][lane] + gauss_matrix[3 * GAUSS + s] * m[3].known[4][lane]);
+    X[17][s] += h * (gauss_matrix[s] * m[0].known[5][lane] + gauss_matrix[GAUSS + s] * m[1].known[5][lane] + gauss_matrix[2 * GAUSS + s] * m[2].known[5][lane] + gauss_matrix[3 * GAUSS + s] * m[3].known[5][lane]);
+    X[18][s] += h * (gauss_matrix[s] * m[0].known[6][lane] + gauss_matrix[GAUSS + s] * m[1].known[6][lane] + gauss_matrix[2 * GAUSS + s] * m[2].known[6][lane] + gauss_matrix[3 * GAUSS + s] * m[3].known[6][lane]);
+    X[19][s] += h * (gauss_matrix[s] * m[0].known[7][lane] + gauss_matrix[GAUSS + s] * m[1].known[7][lane] + gauss_matrix[2 * GAUSS + s] * m[2].known[7][lane] + gauss_matrix[3 * GAUSS + s] * m[3].known[7][lane]);
+    X[20][s] += h * (gauss_matrix[s] * m[0].known[8][lane] + gauss_matrix[GAUSS + s] * m[1].known[8][lane] + gauss_matrix[2 * GAUSS + s] * m[2].known[8][lane] + gauss_matrix[3 * GAUSS + s] * m[3].known[8][lane]);
+  }
+  for (i = 0; i < 35; ++i) {
+    const int own = pivot_0[i], diagonal = diagonal_0[i];
+    Four y = less_blocks_0(F, left_block_0, left_state_0, left_start_0[i], left_start_0[i + 1], X, load_four(X[own]));
+    if (diagonal != UNIT) {
+      const double *f = F + SQUARE * diagonal;
+      y = (load_four(f) * y[0] + load_four(f + GAUSS) * y[1]) + (load_four(f + 2 * GAUSS) * y[2] + load_four(f + 3 * GAUSS) * y[3]);
+    }
+    memcpy(X[own], &y, sizeof y);
+  }
+  for (i = 34; i >= 0; --i) {
+    const int own = pivot_0[i];
+    const Four y = less_blocks_0(F, right_block_0, right_state_0, right_start_0[i], right_start_0[i + 1], X, load_four(X[own]));
+    memcpy(X[own], &y, sizeof y);
+    x[own] += (gauss_end[0] * y[0] + gauss_end[1] * y[1]) + (gauss_end[2] * y[2] + gauss_end[3] * y[3]);
+  }
+  (void)m; (void)h; (void)lane;
+}
+
 /* One step back with columns x of kind 0; F its factors, `lane` its place in m */
 static void step_on_grid_0(const double *restrict F, const Matrices *restrict m, const int lane, double (*restrict x)[24],
-                            double (*restrict X)[GAUSS][24], double (*restrict noise)[GAUSS][COLUMNS], double (*restrict known)[COLUMNS]) {
+                            double (*restrict X)[GAUSS][24], double (*restrict noise)[GAUSS][COLUMNS]) {
   enum { WIDTH = 24 };
   int i, c;
   {
@@ -6151,15 +6292,6 @@ static void step_on_grid_0(const double *restrict F, const Matrices *restrict m,
     const double inverse = 1.0 / gauss_weight[i];
     const double a0 = inverse * gauss_matrix[GAUSS * i], a1 = inverse * gauss_matrix[GAUSS * i + 1], a2 = inverse * gauss_matrix[GAUSS * i + 2], a3 = inverse * gauss_matrix[GAUSS * i + 3];
     for (c = 0; c < WIDTH; ++c) {
-      const double y0 = a0 * X[0][0][c] + a1 * X[0][1][c] + a2 * X[0][2][c] + a3 * X[0][3][c];
-      const double y2 = a0 * X[2][0][c] + a1 * X[2][1][c] + a2 * X[2][2][c] + a3 * X[2][3][c];
-      const double y11 = a0 * X[11][0][c] + a1 * X[11][1][c] + a2 * X[11][2][c] + a3 * X[11][3][c];
-      const double y12 = a0 * X[12][0][c] + a1 * X[12][1][c] + a2 * X[12][2][c] + a3 * X[12][3][c];
-      const double y16 = a0 * X[16][0][c] + a1 * X[16][1][c] + a2 * X[16][2][c] + a3 * X[16][3][c];
-      const double y17 = a0 * X[17][0][c] + a1 * X[17][1][c] + a2 * X[17][2][c] + a3 * X[17][3][c];
-      const double y18 = a0 * X[18][0][c] + a1 * X[18][1][c] + a2 * X[18][2][c] + a3 * X[18][3][c];
-      const double y19 = a0 * X[19][0][c] + a1 * X[19][1][c] + a2 * X[19][2][c] + a3 * X[19][3][c];
-      const double y20 = a0 * X[20][0][c] + a1 * X[20][1][c] + a2 * X[20][2][c] + a3 * X[20][3][c];
       const double y27 = a0 * X[27][0][c] + a1 * X[27][1][c] + a2 * X[27][2][c] + a3 * X[27][3][c];
       const double y28 = a0 * X[28][0][c] + a1 * X[28][1][c] + a2 * X[28][2][c] + a3 * X[28][3][c];
       const double y29 = a0 * X[29][0][c] + a1 * X[29][1][c] + a2 * X[29][2][c] + a3 * X[29][3][c];
@@ -6171,7 +6303,6 @@ static void step_on_grid_0(const double *restrict F, const Matrices *restrict m,
       noise[2][i][0 + c] = m[i].B[3][lane] * y31;
       noise[3][i][0 + c] = m[i].B[4][lane] * y33;
       noise[4][i][0 + c] = m[i].B[5][lane] * y34;
-      known[i][0 + c] = m[i].known[0][lane] * y0 + m[i].known[1][lane] * y2 + m[i].known[2][lane] * y11 + m[i].known[3][lane] * y12 + m[i].known[4][lane] * y16 + m[i].known[5][lane] * y17 + m[i].known[6][lane] * y18 + m[i].known[7][lane] * y19 + m[i].known[8][lane] * y20;
     }
     (void)a0; (void)a1; (void)a2; (void)a3;
   }
@@ -6179,21 +6310,25 @@ static void step_on_grid_0(const double *restrict F, const Matrices *restrict m,
 }
 
 /* Kind 1: 11 states, 36 blocks */
-static const int pivot_1[11] = { 10, 2, 3, 4, 5, 6, 0, 1, 9, 7, 8 };
-static const int diagonal_1[11] = { 0, 1, 3, 4, 6, 8, 12, 17, 18, -1, 20 };
-static const int entry_block_1[34] = { 12, 16, 34, 33, 27, 1, 2, 35, 9, 13, 4, 5, 10, 14, 32, 6, 7, 11, 15, 31, 8, 28, 24, 19, 22, 29, 25, 21, 20, 23,
-  30, 26, 18, 0 };
-static const int right_start_1[12] = { 0, 0, 2, 3, 4, 5, 5, 9, 12, 14, 15, 15 };
-static const int right_block_1[15] = { 34, 35, 33, 32, 31, 27, 28, 29, 30, 24, 25, 26, 22, 23, 21 };
-static const int above_start_1[12] = { 0, 0, 0, 1, 1, 2, 3, 5, 6, 8, 11, 15 };
-static const int above_state_1[15] = { 2, 4, 5, 2, 3, 0, 0, 1, 0, 1, 9, 0, 1, 9, 7 };
-static const int above_block_1[15] = { 35, 32, 31, 34, 33, 27, 30, 26, 28, 24, 22, 29, 25, 23, 21 };
-static const int below_start_1[12] = { 0, 0, 1, 1, 4, 7, 9, 10, 10, 10, 11, 11 };
-static const int below_state_1[11] = { 3, 0, 1, 5, 0, 1, 6, 0, 1, 1, 8 };
-static const int below_block_1[11] = { 2, 9, 13, 5, 10, 14, 7, 11, 15, 16, 19 };
+static const int pivot_1[11] = { 10, 2, 3, 4, 5, 6, 7, 8, 9, 0, 1 };
+static const int diagonal_1[11] = { 0, 1, 3, 4, 6, 8, -1, 10, 13, 20, 28 };
+static const int entry_block_1[34] = { 20, 27, 34, 33, 29, 1, 2, 35, 14, 21, 4, 5, 15, 22, 32, 6, 7, 16, 23, 31, 8, 17, 24, 9, 11, 18, 25, 30, 10, 12,
+  19, 26, 13, 0 };
+static const int left_start_1[12] = { 0, 0, 0, 1, 1, 2, 3, 3, 4, 6, 12, 19 };
+static const int left_state_1[19] = { 2, 4, 5, 7, 7, 8, 4, 5, 6, 7, 8, 9, 4, 5, 6, 7, 8, 9, 0 };
+static const int left_block_1[19] = { 2, 5, 7, 9, 11, 12, 14, 15, 16, 17, 18, 19, 21, 22, 23, 24, 25, 26, 27 };
+static const int right_start_1[12] = { 0, 0, 2, 3, 4, 5, 5, 6, 6, 6, 7, 7 };
+static const int right_state_1[7] = { 0, 3, 0, 5, 6, 8, 1 };
+static const int right_block_1[7] = { 34, 35, 33, 32, 31, 30, 29 };
+static const int above_start_1[12] = { 0, 0, 0, 1, 1, 2, 3, 3, 4, 4, 6, 7 };
+static const int above_state_1[7] = { 2, 4, 5, 7, 2, 3, 0 };
+static const int above_block_1[7] = { 35, 32, 31, 30, 34, 33, 29 };
+static const int below_start_1[12] = { 0, 0, 1, 1, 4, 7, 9, 13, 16, 18, 19, 19 };
+static const int below_state_1[19] = { 3, 0, 1, 5, 0, 1, 6, 0, 1, 0, 1, 8, 9, 0, 1, 9, 0, 1, 1 };
+static const int below_block_1[19] = { 2, 14, 21, 5, 15, 22, 7, 16, 23, 17, 24, 9, 11, 18, 25, 12, 19, 26, 27 };
+static const int target_1[13] = { 33, 3, 15, 22, 6, 16, 23, 8, 18, 25, 10, 12, 28 };
 static const int entry_1[34] = { 105, 106, 107, 108, 109, 117, 118, 121, 151, 152, 153, 154, 162, 163, 164, 165, 166, 174, 175, 176, 177, 185,
   186, 187, 188, 196, 197, 198, 199, 200, 208, 209, 210, 225 };
-static const int target_1[13] = { 33, 3, 10, 14, 6, 11, 15, 8, 17, 24, 25, 26, 20 };
 
 static int factorise_1(const Matrices *restrict m, const double *restrict h, Eight *restrict N) {
   const int *target = target_1;
@@ -6223,9 +6358,44 @@ static int factorise_1(const Matrices *restrict m, const double *restrict h, Eig
   return 1;
 }
 
+/* x less the sum of F y over listed blocks */
+static inline Four less_blocks_1(const double *F, const int *block, const int *state, const int first, const int last, double (*X)[GAUSS], Four x) {
+  int l, s;
+  for (l = first; l < last; ++l)
+    for (s = 0; s < GAUSS; ++s) x -= load_four(F + SQUARE * block[l] + GAUSS * s) * X[state[l]][s];
+  return x;
+}
+
+/* One step forward with the mean x of the rows of kind 1; X is what it is at the stages */
+static void mean_on_grid_1(const double *restrict F, const Matrices *restrict m, const double h, const int lane, double *restrict x, double (*restrict X)[GAUSS]) {
+  int i, s;
+  for (i = 0; i < 11; ++i)
+    for (s = 0; s < GAUSS; ++s) X[i][s] = x[i];
+  for (s = 0; s < GAUSS; ++s) {
+    X[0][s] += h * (gauss_matrix[s] * m[0].known[7][lane] + gauss_matrix[GAUSS + s] * m[1].known[7][lane] + gauss_matrix[2 * GAUSS + s] * m[2].known[7][lane] + gauss_matrix[3 * GAUSS + s] * m[3].known[7][lane]);
+    X[1][s] += h * (gauss_matrix[s] * m[0].known[8][lane] + gauss_matrix[GAUSS + s] * m[1].known[8][lane] + gauss_matrix[2 * GAUSS + s] * m[2].known[8][lane] + gauss_matrix[3 * GAUSS + s] * m[3].known[8][lane]);
+  }
+  for (i = 0; i < 11; ++i) {
+    const int own = pivot_1[i], diagonal = diagonal_1[i];
+    Four y = less_blocks_1(F, left_block_1, left_state_1, left_start_1[i], left_start_1[i + 1], X, load_four(X[own]));
+    if (diagonal != UNIT) {
+      const double *f = F + SQUARE * diagonal;
+      y = (load_four(f) * y[0] + load_four(f + GAUSS) * y[1]) + (load_four(f + 2 * GAUSS) * y[2] + load_four(f + 3 * GAUSS) * y[3]);
+    }
+    memcpy(X[own], &y, sizeof y);
+  }
+  for (i = 10; i >= 0; --i) {
+    const int own = pivot_1[i];
+    const Four y = less_blocks_1(F, right_block_1, right_state_1, right_start_1[i], right_start_1[i + 1], X, load_four(X[own]));
+    memcpy(X[own], &y, sizeof y);
+    x[own] += (gauss_end[0] * y[0] + gauss_end[1] * y[1]) + (gauss_end[2] * y[2] + gauss_end[3] * y[3]);
+  }
+  (void)m; (void)h; (void)lane;
+}
+
 /* One step back with columns x of kind 1; F its factors, `lane` its place in m */
 static void step_on_grid_1(const double *restrict F, const Matrices *restrict m, const int lane, double (*restrict x)[8],
-                            double (*restrict X)[GAUSS][8], double (*restrict noise)[GAUSS][COLUMNS], double (*restrict known)[COLUMNS]) {
+                            double (*restrict X)[GAUSS][8], double (*restrict noise)[GAUSS][COLUMNS]) {
   enum { WIDTH = 8 };
   int i, c;
   {
@@ -6244,8 +6414,6 @@ static void step_on_grid_1(const double *restrict F, const Matrices *restrict m,
     const double inverse = 1.0 / gauss_weight[i];
     const double a0 = inverse * gauss_matrix[GAUSS * i], a1 = inverse * gauss_matrix[GAUSS * i + 1], a2 = inverse * gauss_matrix[GAUSS * i + 2], a3 = inverse * gauss_matrix[GAUSS * i + 3];
     for (c = 0; c < WIDTH; ++c) {
-      const double y0 = a0 * X[0][0][c] + a1 * X[0][1][c] + a2 * X[0][2][c] + a3 * X[0][3][c];
-      const double y1 = a0 * X[1][0][c] + a1 * X[1][1][c] + a2 * X[1][2][c] + a3 * X[1][3][c];
       const double y4 = a0 * X[4][0][c] + a1 * X[4][1][c] + a2 * X[4][2][c] + a3 * X[4][3][c];
       const double y5 = a0 * X[5][0][c] + a1 * X[5][1][c] + a2 * X[5][2][c] + a3 * X[5][3][c];
       const double y6 = a0 * X[6][0][c] + a1 * X[6][1][c] + a2 * X[6][2][c] + a3 * X[6][3][c];
@@ -6255,7 +6423,6 @@ static void step_on_grid_1(const double *restrict F, const Matrices *restrict m,
       noise[1][i][24 + c] = m[i].B[1][lane] * y4 + m[i].B[2][lane] * y5;
       noise[2][i][24 + c] = m[i].B[3][lane] * y8;
       noise[4][i][24 + c] = m[i].B[5][lane] * y10;
-      known[i][24 + c] = m[i].known[7][lane] * y0 + m[i].known[8][lane] * y1;
     }
     (void)a0; (void)a1; (void)a2; (void)a3;
   }
@@ -6266,7 +6433,11 @@ static void step_on_grid_1(const double *restrict F, const Matrices *restrict m,
 static const int pivot_2[3] = { 2, 0, 1 };
 static const int diagonal_2[3] = { 0, -1, 2 };
 static const int entry_block_2[4] = { 1, 3, 2, 0 };
+static const int left_start_2[4] = { 0, 0, 0, 1 };
+static const int left_state_2[1] = { 0 };
+static const int left_block_2[1] = { 1 };
 static const int right_start_2[4] = { 0, 0, 1, 1 };
+static const int right_state_2[1] = { 1 };
 static const int right_block_2[1] = { 3 };
 static const int above_start_2[4] = { 0, 0, 0, 1 };
 static const int above_state_2[1] = { 0 };
@@ -6274,8 +6445,8 @@ static const int above_block_2[1] = { 3 };
 static const int below_start_2[4] = { 0, 0, 1, 1 };
 static const int below_state_2[1] = { 1 };
 static const int below_block_2[1] = { 1 };
-static const int entry_2[4] = { 187, 198, 199, 218 };
 static const int target_2[1] = { 2 };
+static const int entry_2[4] = { 187, 198, 199, 218 };
 
 static int factorise_2(const Matrices *restrict m, const double *restrict h, Eight *restrict N) {
   const int *target = target_2;
@@ -6305,9 +6476,42 @@ static int factorise_2(const Matrices *restrict m, const double *restrict h, Eig
   return 1;
 }
 
+/* x less the sum of F y over listed blocks */
+static inline Four less_blocks_2(const double *F, const int *block, const int *state, const int first, const int last, double (*X)[GAUSS], Four x) {
+  int l, s;
+  for (l = first; l < last; ++l)
+    for (s = 0; s < GAUSS; ++s) x -= load_four(F + SQUARE * block[l] + GAUSS * s) * X[state[l]][s];
+  return x;
+}
+
+/* One step forward with the mean x of the rows of kind 2; X is what it is at the stages */
+static void mean_on_grid_2(const double *restrict F, const Matrices *restrict m, const double h, const int lane, double *restrict x, double (*restrict X)[GAUSS]) {
+  int i, s;
+  for (i = 0; i < 3; ++i)
+    for (s = 0; s < GAUSS; ++s) X[i][s] = x[i];
+  for (s = 0; s < GAUSS; ++s) {
+  }
+  for (i = 0; i < 3; ++i) {
+    const int own = pivot_2[i], diagonal = diagonal_2[i];
+    Four y = less_blocks_2(F, left_block_2, left_state_2, left_start_2[i], left_start_2[i + 1], X, load_four(X[own]));
+    if (diagonal != UNIT) {
+      const double *f = F + SQUARE * diagonal;
+      y = (load_four(f) * y[0] + load_four(f + GAUSS) * y[1]) + (load_four(f + 2 * GAUSS) * y[2] + load_four(f + 3 * GAUSS) * y[3]);
+    }
+    memcpy(X[own], &y, sizeof y);
+  }
+  for (i = 2; i >= 0; --i) {
+    const int own = pivot_2[i];
+    const Four y = less_blocks_2(F, right_block_2, right_state_2, right_start_2[i], right_start_2[i + 1], X, load_four(X[own]));
+    memcpy(X[own], &y, sizeof y);
+    x[own] += (gauss_end[0] * y[0] + gauss_end[1] * y[1]) + (gauss_end[2] * y[2] + gauss_end[3] * y[3]);
+  }
+  (void)m; (void)h; (void)lane;
+}
+
 /* One step back with columns x of kind 2; F its factors, `lane` its place in m */
 static void step_on_grid_2(const double *restrict F, const Matrices *restrict m, const int lane, double (*restrict x)[8],
-                            double (*restrict X)[GAUSS][8], double (*restrict noise)[GAUSS][COLUMNS], double (*restrict known)[COLUMNS]) {
+                            double (*restrict X)[GAUSS][8], double (*restrict noise)[GAUSS][COLUMNS]) {
   enum { WIDTH = 8 };
   int i, c;
   {
@@ -6330,7 +6534,6 @@ static void step_on_grid_2(const double *restrict F, const Matrices *restrict m,
       const double y2 = a0 * X[2][0][c] + a1 * X[2][1][c] + a2 * X[2][2][c] + a3 * X[2][3][c];
       noise[2][i][32 + c] = m[i].B[3][lane] * y1;
       noise[3][i][32 + c] = m[i].B[4][lane] * y2;
-      known[i][32 + c] = 0.0;
     }
     (void)a0; (void)a1; (void)a2; (void)a3;
   }
@@ -6361,57 +6564,432 @@ static void add_products_on_grid(const double (*restrict noise)[GAUSS][COLUMNS],
     }
 }
 
-/* What a run on a grid needs, too much for the stack of a thread */
+/* What eight steps side by side leave: their matrices and their factors */
 typedef struct {
-  Eight N_0[252 * SQUARE];
   double F_0[SIDE][252 * SQUARE];
-  double x_0[35][24], X_0[35][GAUSS][24];
-  Eight N_1[36 * SQUARE];
   double F_1[SIDE][36 * SQUARE];
-  double x_1[11][8], X_1[11][GAUSS][8];
-  Eight N_2[4 * SQUARE];
   double F_2[SIDE][4 * SQUARE];
-  double x_2[3][8], X_2[3][GAUSS][8];
-  double noise[NOISES_1][GAUSS][COLUMNS], known[GAUSS][COLUMNS];
   double v[GAUSS][TABLE_VALUES_1][STAGES], t[GAUSS][1][STAGES], h[SIDE];
   Matrices m[GAUSS];
+} Together;
+
+/* What a run on a grid needs, too much for the stack of a thread; then the steps of a segment, eight by eight */
+typedef struct {
+  Eight N_0[252 * SQUARE];
+  double x_0[35][24], X_0[35][GAUSS][24];
+  double mean_0[35], stage_mean_0[35][GAUSS];
+  Eight N_1[36 * SQUARE];
+  double x_1[11][8], X_1[11][GAUSS][8];
+  double mean_1[11], stage_mean_1[11][GAUSS];
+  Eight N_2[4 * SQUARE];
+  double x_2[3][8], X_2[3][GAUSS][8];
+  double mean_2[3], stage_mean_2[3][GAUSS];
+  double noise[NOISES_1][GAUSS][COLUMNS];
   Segment g;
 } OnGrid;
 
 /* Evaluate and eliminate `count` steps from edges[0] on, side by side; room that is left repeats the first. */
-static int factorise_steps(Flight *f, const double *edges, const int count, OnGrid *w) {
+static int factorise_steps(Flight *f, const double *edges, const int count, OnGrid *w, Together *e) {
   int i, j, k, n;
   for (j = 0; j < STAGES; ++j) { /* the matrices have room for more than is eliminated */
     const int of = j < count ? j : 0;
-    if (j < SIDE) w->h[j] = edges[of + 1] - edges[of];
+    if (j < SIDE) e->h[j] = edges[of + 1] - edges[of];
     for (i = 0; i < GAUSS; ++i) {
       if (j < count) {
-        w->t[i][0][j] = smaller(larger(edges[j] + gauss_node[i] * (edges[j + 1] - edges[j]), f->low), f->high);
-        lookup(f, w->t[i][0][j], w->v[i], j);
+        e->t[i][0][j] = smaller(larger(edges[j] + gauss_node[i] * (edges[j + 1] - edges[j]), f->low), f->high);
+        lookup(f, e->t[i][0][j], e->v[i], j);
       } else {
-        w->t[i][0][j] = w->t[i][0][0];
-        for (k = 0; k < TABLE_VALUES; ++k) w->v[i][k][j] = w->v[i][k][0];
+        e->t[i][0][j] = e->t[i][0][0];
+        for (k = 0; k < TABLE_VALUES; ++k) e->v[i][k][j] = e->v[i][k][0];
       }
     }
   }
   for (i = 0; i < GAUSS; ++i)
-    stage_matrices((const double (*)[STAGES])w->t[i], (const double (*)[STAGES])w->v[i], f->p, w->m[i].A, w->m[i].B, w->m[i].known);
-  if (!factorise_0(w->m, w->h, w->N_0)) return 0;
-  for (n = 0; n < 252 * SQUARE; n += LANES) transpose_eight(w->N_0 + n, w->F_0[0] + n, 252 * SQUARE);
-  if (!factorise_1(w->m, w->h, w->N_1)) return 0;
-  for (n = 0; n < 36 * SQUARE; n += LANES) transpose_eight(w->N_1 + n, w->F_1[0] + n, 36 * SQUARE);
-  if (!factorise_2(w->m, w->h, w->N_2)) return 0;
-  for (n = 0; n < 4 * SQUARE; n += LANES) transpose_eight(w->N_2 + n, w->F_2[0] + n, 4 * SQUARE);
+    stage_matrices((const double (*)[STAGES])e->t[i], (const double (*)[STAGES])e->v[i], f->p, e->m[i].A, e->m[i].B, e->m[i].known);
+  if (!factorise_0(e->m, e->h, w->N_0)) return 0;
+  for (n = 0; n < 252 * SQUARE; n += LANES) transpose_eight(w->N_0 + n, e->F_0[0] + n, 252 * SQUARE);
+  if (!factorise_1(e->m, e->h, w->N_1)) return 0;
+  for (n = 0; n < 36 * SQUARE; n += LANES) transpose_eight(w->N_1 + n, e->F_1[0] + n, 36 * SQUARE);
+  if (!factorise_2(e->m, e->h, w->N_2)) return 0;
+  for (n = 0; n < 4 * SQUARE; n += LANES) transpose_eight(w->N_2 + n, e->F_2[0] + n, 4 * SQUARE);
   return 1;
 }
 
-static int segment_on_grid(Flight *f, const double *edges, const int steps, OnGrid *w, Counters *done, Failure *why, const volatile int *stop) {
+/* C and G u of the outputs that tables of the mean hold */
+static void outputs_of_mean(const double (*restrict t)[STAGES], const double (*restrict v)[STAGES], const double *restrict p,
+                            double (*restrict C)[STAGES], double (*restrict direct)[STAGES]) {
+  int j;
+  (void)t; (void)v; (void)p; (void)C; (void)direct;
+  for (j = 0; j < STAGES; ++j) {
+    const double a0 = 1.0 / v[V_relative_velocity][j];
+    const double a1 = -a0;
+    C[0][j] = a1;
+    C[1][j] = 1.0;
+    const double a2 = p[P_control_T3_numerator_s0] / p[P_control_T3_denominator_s2];
+    const double a3 = p[P_control_T3_denominator_s0] / p[P_control_T3_denominator_s2];
+    const double a4 = fabs(a3);
+    const double a5 = a2 / a4;
+    const double a6 = a5 * p[P_control_T3_gain];
+    C[2][j] = a6;
+    C[3][j] = v[V_bending_1_slope_at_gimbal][j];
+    C[4][j] = v[V_bending_2_slope_at_gimbal][j];
+    const double a7 = v[V_zones_normal_force_slope_1][j] + v[V_zones_normal_force_slope_2][j];
+    const double a8 = a7 + v[V_zones_normal_force_slope_3][j];
+    const double a9 = a8 + v[V_zones_normal_force_slope_4][j];
+    const double a10 = a9 + v[V_zones_normal_force_slope_5][j];
+    const double a11 = 1.0 / a10;
+    const double a12 = a11 / v[V_relative_velocity][j];
+    const double a13 = v[V_zones_normal_force_slope_2][j] * a12;
+    C[5][j] = a13;
+    const double a14 = v[V_zones_normal_force_slope_3][j] * a12;
+    C[6][j] = a14;
+    const double a15 = v[V_zones_normal_force_slope_4][j] * a12;
+    C[7][j] = a15;
+    const double a16 = v[V_zones_normal_force_slope_5][j] * a12;
+    C[8][j] = a16;
+    const double a17 = v[V_zones_normal_force_slope_1][j] * a12;
+    const double a18 = p[P_wind_sigma_scale] * a17;
+    const double a19 = v[V_wind_filter_H_1_1][j] * a18;
+    C[9][j] = a19;
+    const double a20 = v[V_wind_filter_H_1_2][j] * a18;
+    C[10][j] = a20;
+    const double a21 = v[V_wind_filter_H_1_3][j] * a18;
+    C[11][j] = a21;
+    const double a22 = p[P_turbulence_sigma_scale] * v[V_turbulence_sigma][j];
+    const double a23 = a22 * a17;
+    const double a24 = 0.5000000000000001 * a23;
+    C[12][j] = a24;
+    const double a25 = 0.8660254037844386 * a23;
+    C[13][j] = a25;
+    const double a26 = -a23;
+    C[14][j] = a26;
+    const double a27 = v[V_zones_normal_force_slope_1][j] / a10;
+    const double a28 = a27 / v[V_relative_velocity][j];
+    const double a29 = p[P_wind_mean_scale] * v[V_wind_mean][j];
+    const double a30 = a28 * a29;
+    direct[0][j] = a30;
+    direct[1][j] = 0.0;
+  }
+}
+
+/* What depends on tables of the mean: entries of A in the order of late_entry, and B */
+static void waiting_matrices(const double (*restrict t)[STAGES], const double (*restrict v)[STAGES], const double *restrict p,
+                             double (*restrict late)[STAGES], double (*restrict B)[STAGES]) {
+  int j;
+  (void)t; (void)v; (void)p; (void)late; (void)B;
+  for (j = 0; j < STAGES; ++j) {
+    const double a0 = v[V_mean_attitude][j] * v[V_thrust][j];
+    const double a1 = a0 / v[V_mass][j];
+    const double a2 = v[V_mean_engine_angle][j] * v[V_control_thrust][j];
+    const double a3 = a2 / v[V_mass][j];
+    const double a4 = a1 + a3;
+    const double a5 = p[P_thrust_sigma] * a4;
+    late[0][j] = a5;
+    const double a6 = v[V_center_of_gravity][j] * v[V_control_thrust][j];
+    const double a7 = v[V_mean_engine_angle][j] * a6;
+    const double a8 = a7 / v[V_moment_of_inertia][j];
+    const double a9 = p[P_thrust_sigma] * a8;
+    const double a10 = -a9;
+    late[1][j] = a10;
+    const double a11 = v[V_bending_1_displacement_at_s1_lox][j] * v[V_slosh_s1_lox_mass][j];
+    const double a12 = a11 * a1;
+    const double a13 = v[V_bending_1_displacement_at_s1_rp1][j] * v[V_slosh_s1_rp1_mass][j];
+    const double a14 = a13 * a1;
+    const double a15 = a12 + a14;
+    const double a16 = v[V_bending_1_displacement_at_s2_lox][j] * v[V_slosh_s2_lox_mass][j];
+    const double a17 = a16 * a1;
+    const double a18 = a15 + a17;
+    const double a19 = a11 * v[V_bending_1_displacement_at_s1_lox][j];
+    const double a20 = a13 * v[V_bending_1_displacement_at_s1_rp1][j];
+    const double a21 = a19 + a20;
+    const double a22 = a16 * v[V_bending_1_displacement_at_s2_lox][j];
+    const double a23 = a21 + a22;
+    const double a24 = v[V_bending_1_generalized_mass][j] - a23;
+    const double a25 = a18 / a24;
+    const double a26 = v[V_bending_2_displacement_at_s1_lox][j] * v[V_slosh_s1_lox_mass][j];
+    const double a27 = a26 * v[V_bending_1_displacement_at_s1_lox][j];
+    const double a28 = v[V_bending_2_displacement_at_s1_rp1][j] * v[V_slosh_s1_rp1_mass][j];
+    const double a29 = a28 * v[V_bending_1_displacement_at_s1_rp1][j];
+    const double a30 = a27 + a29;
+    const double a31 = v[V_bending_2_displacement_at_s2_lox][j] * v[V_slosh_s2_lox_mass][j];
+    const double a32 = a31 * v[V_bending_1_displacement_at_s2_lox][j];
+    const double a33 = a30 + a32;
+    const double a34 = a33 / a24;
+    const double a35 = a26 * a1;
+    const double a36 = a28 * a1;
+    const double a37 = a35 + a36;
+    const double a38 = a31 * a1;
+    const double a39 = a37 + a38;
+    const double a40 = a34 * a18;
+    const double a41 = a39 + a40;
+    const double a42 = a26 * v[V_bending_2_displacement_at_s1_lox][j];
+    const double a43 = a28 * v[V_bending_2_displacement_at_s1_rp1][j];
+    const double a44 = a42 + a43;
+    const double a45 = a31 * v[V_bending_2_displacement_at_s2_lox][j];
+    const double a46 = a44 + a45;
+    const double a47 = v[V_bending_2_generalized_mass][j] - a46;
+    const double a48 = a34 * a34;
+    const double a49 = a48 * a24;
+    const double a50 = a47 - a49;
+    const double a51 = a41 / a50;
+    const double a52 = a34 * a51;
+    const double a53 = a25 + a52;
+    const double a54 = v[V_bending_1_displacement_at_gimbal][j] * v[V_control_thrust][j];
+    const double a55 = v[V_mean_engine_angle][j] * a54;
+    const double a56 = v[V_slosh_s1_lox_attach_point][j] - v[V_center_of_gravity][j];
+    const double a57 = a56 * a8;
+    const double a58 = a3 - a57;
+    const double a59 = a11 * a58;
+    const double a60 = v[V_slosh_s1_rp1_attach_point][j] - v[V_center_of_gravity][j];
+    const double a61 = a60 * a8;
+    const double a62 = a3 - a61;
+    const double a63 = a13 * a62;
+    const double a64 = a59 + a63;
+    const double a65 = v[V_slosh_s2_lox_attach_point][j] - v[V_center_of_gravity][j];
+    const double a66 = a65 * a8;
+    const double a67 = a3 - a66;
+    const double a68 = a16 * a67;
+    const double a69 = a64 + a68;
+    const double a70 = a55 + a69;
+    const double a71 = a70 / a24;
+    const double a72 = v[V_bending_2_displacement_at_gimbal][j] * v[V_control_thrust][j];
+    const double a73 = v[V_mean_engine_angle][j] * a72;
+    const double a74 = a26 * a58;
+    const double a75 = a28 * a62;
+    const double a76 = a74 + a75;
+    const double a77 = a31 * a67;
+    const double a78 = a76 + a77;
+    const double a79 = a73 + a78;
+    const double a80 = a34 * a70;
+    const double a81 = a79 + a80;
+    const double a82 = a81 / a50;
+    const double a83 = a34 * a82;
+    const double a84 = a71 + a83;
+    const double a85 = a53 + a84;
+    const double a86 = p[P_thrust_sigma] * a85;
+    late[2][j] = a86;
+    const double a87 = a51 + a82;
+    const double a88 = p[P_thrust_sigma] * a87;
+    late[3][j] = a88;
+    const double a89 = v[V_bending_1_displacement_at_s1_lox][j] * a53;
+    const double a90 = v[V_bending_2_displacement_at_s1_lox][j] * a51;
+    const double a91 = a89 + a90;
+    const double a92 = a1 + a91;
+    const double a93 = v[V_bending_1_displacement_at_s1_lox][j] * a84;
+    const double a94 = v[V_bending_2_displacement_at_s1_lox][j] * a82;
+    const double a95 = a93 + a94;
+    const double a96 = a58 + a95;
+    const double a97 = a92 + a96;
+    const double a98 = p[P_thrust_sigma] * a97;
+    const double a99 = -a98;
+    late[4][j] = a99;
+    const double a100 = v[V_bending_1_displacement_at_s1_rp1][j] * a53;
+    const double a101 = v[V_bending_2_displacement_at_s1_rp1][j] * a51;
+    const double a102 = a100 + a101;
+    const double a103 = a1 + a102;
+    const double a104 = v[V_bending_1_displacement_at_s1_rp1][j] * a84;
+    const double a105 = v[V_bending_2_displacement_at_s1_rp1][j] * a82;
+    const double a106 = a104 + a105;
+    const double a107 = a62 + a106;
+    const double a108 = a103 + a107;
+    const double a109 = p[P_thrust_sigma] * a108;
+    const double a110 = -a109;
+    late[5][j] = a110;
+    const double a111 = v[V_bending_1_displacement_at_s2_lox][j] * a53;
+    const double a112 = v[V_bending_2_displacement_at_s2_lox][j] * a51;
+    const double a113 = a111 + a112;
+    const double a114 = a1 + a113;
+    const double a115 = v[V_bending_1_displacement_at_s2_lox][j] * a84;
+    const double a116 = v[V_bending_2_displacement_at_s2_lox][j] * a82;
+    const double a117 = a115 + a116;
+    const double a118 = a67 + a117;
+    const double a119 = a114 + a118;
+    const double a120 = p[P_thrust_sigma] * a119;
+    const double a121 = -a120;
+    late[6][j] = a121;
+    const double a122 = v[V_dynamic_pressure][j] * p[P_reference_area];
+    const double a123 = a122 * v[V_normal_force_slope][j];
+    const double a124 = a123 * v[V_center_of_pressure][j];
+    const double a125 = v[V_mean_angle_of_attack][j] * a124;
+    const double a126 = a125 / v[V_moment_of_inertia][j];
+    const double a127 = p[P_center_of_pressure_sigma] * a126;
+    late[7][j] = a127;
+    const double a128 = a56 * a126;
+    const double a129 = a11 * a128;
+    const double a130 = a60 * a126;
+    const double a131 = a13 * a130;
+    const double a132 = a129 + a131;
+    const double a133 = a65 * a126;
+    const double a134 = a16 * a133;
+    const double a135 = a132 + a134;
+    const double a136 = a135 / a24;
+    const double a137 = a26 * a128;
+    const double a138 = a28 * a130;
+    const double a139 = a137 + a138;
+    const double a140 = a31 * a133;
+    const double a141 = a139 + a140;
+    const double a142 = a34 * a135;
+    const double a143 = a141 + a142;
+    const double a144 = a143 / a50;
+    const double a145 = a34 * a144;
+    const double a146 = a136 + a145;
+    const double a147 = a122 * v[V_bending_1_normal_force_slope_times_slope][j];
+    const double a148 = a147 * v[V_mean_angle_of_attack][j];
+    const double a149 = a148 * v[V_center_of_pressure][j];
+    const double a150 = a149 / a24;
+    const double a151 = a122 * v[V_bending_2_normal_force_slope_times_slope][j];
+    const double a152 = a151 * v[V_mean_angle_of_attack][j];
+    const double a153 = a152 * v[V_center_of_pressure][j];
+    const double a154 = a34 * a149;
+    const double a155 = a153 + a154;
+    const double a156 = a155 / a50;
+    const double a157 = a34 * a156;
+    const double a158 = a150 + a157;
+    const double a159 = a146 + a158;
+    const double a160 = p[P_center_of_pressure_sigma] * a159;
+    late[8][j] = a160;
+    const double a161 = a144 + a156;
+    const double a162 = p[P_center_of_pressure_sigma] * a161;
+    late[9][j] = a162;
+    const double a163 = v[V_bending_1_displacement_at_s1_lox][j] * a146;
+    const double a164 = v[V_bending_2_displacement_at_s1_lox][j] * a144;
+    const double a165 = a163 + a164;
+    const double a166 = a128 + a165;
+    const double a167 = v[V_bending_1_displacement_at_s1_lox][j] * a158;
+    const double a168 = v[V_bending_2_displacement_at_s1_lox][j] * a156;
+    const double a169 = a167 + a168;
+    const double a170 = a166 + a169;
+    const double a171 = p[P_center_of_pressure_sigma] * a170;
+    const double a172 = -a171;
+    late[10][j] = a172;
+    const double a173 = v[V_bending_1_displacement_at_s1_rp1][j] * a146;
+    const double a174 = v[V_bending_2_displacement_at_s1_rp1][j] * a144;
+    const double a175 = a173 + a174;
+    const double a176 = a130 + a175;
+    const double a177 = v[V_bending_1_displacement_at_s1_rp1][j] * a158;
+    const double a178 = v[V_bending_2_displacement_at_s1_rp1][j] * a156;
+    const double a179 = a177 + a178;
+    const double a180 = a176 + a179;
+    const double a181 = p[P_center_of_pressure_sigma] * a180;
+    const double a182 = -a181;
+    late[11][j] = a182;
+    const double a183 = v[V_bending_1_displacement_at_s2_lox][j] * a146;
+    const double a184 = v[V_bending_2_displacement_at_s2_lox][j] * a144;
+    const double a185 = a183 + a184;
+    const double a186 = a133 + a185;
+    const double a187 = v[V_bending_1_displacement_at_s2_lox][j] * a158;
+    const double a188 = v[V_bending_2_displacement_at_s2_lox][j] * a156;
+    const double a189 = a187 + a188;
+    const double a190 = a186 + a189;
+    const double a191 = p[P_center_of_pressure_sigma] * a190;
+    const double a192 = -a191;
+    late[12][j] = a192;
+    const double a193 = sqrt(v[V_met_altitude_rate][j]);
+    const double a194 = a193 * v[V_wind_filter_G_3_1][j];
+    B[0][j] = a194;
+    const double a195 = a193 * v[V_wind_filter_G_1_2][j];
+    B[1][j] = a195;
+    const double a196 = a193 * v[V_wind_filter_G_2_2][j];
+    B[2][j] = a196;
+    const double a197 = v[V_met_altitude_rate][j] / p[P_turbulence_length];
+    const double a198 = sqrt(a197);
+    const double a199 = a198 + a198;
+    B[3][j] = a199;
+    const double a200 = 2.0 / p[P_thrust_correlation_time];
+    const double a201 = sqrt(a200);
+    B[4][j] = a201;
+    const double a202 = 2.0 / p[P_center_of_pressure_correlation_time];
+    const double a203 = sqrt(a202);
+    B[5][j] = a203;
+  }
+}
+
+enum { LATE = 13 };
+static const int late_entry[13] = { 211, 212, 213, 214, 215, 216, 217, 219, 220, 221, 222, 223, 224 };
+static const int late_place_0[13][2] = { { 0, 40 }, { 1, 56 }, { 2, 74 }, { 3, 96 }, { 4, 119 }, { 5, 143 }, { 6, 168 }, { 7, 57 }, { 8, 75 }, { 9, 97 }, { 10, 120 }, { 11, 144 }, { 12, 169 } }; /* number in late_entry, block */
+static const int late_place_1[1][2] = { { 0, 0 } }; /* number in late_entry, block */
+static const int late_place_2[1][2] = { { 0, 0 } }; /* number in late_entry, block */
+
+/* Carry the mean over steps; with `fill` its tables have their values of it then, and what waited for them is written. */
+static void carry_mean_on_grid(Flight *f, const int count, OnGrid *w, Together *e, const int fill) {
+  double C[GAUSS][15][STAGES], direct[GAUSS][2][STAGES], late[13][STAGES];
+  int i, k, l, s;
+  int j;
+  for (i = 0; i < GAUSS && fill; ++i) outputs_of_mean((const double (*)[STAGES])e->t[i], (const double (*)[STAGES])e->v[i], f->p, C[i], direct[i]);
+  for (j = 0; j < count; ++j) {
+    mean_on_grid_0(e->F_0[j], e->m, e->h[j], j, w->mean_0, w->stage_mean_0);
+    mean_on_grid_1(e->F_1[j], e->m, e->h[j], j, w->mean_1, w->stage_mean_1);
+    mean_on_grid_2(e->F_2[j], e->m, e->h[j], j, w->mean_2, w->stage_mean_2);
+    for (i = 0; i < GAUSS && fill; ++i) {
+      e->v[i][146][j] = direct[i][0][j] + C[i][0][j] * w->stage_mean_0[0][i] + C[i][1][j] * w->stage_mean_0[1][i] + C[i][5][j] * w->stage_mean_1[0][i] + C[i][6][j] * w->stage_mean_1[2][i] + C[i][7][j] * w->stage_mean_0[23][i] + C[i][8][j] * w->stage_mean_0[25][i] + C[i][9][j] * w->stage_mean_1[4][i] + C[i][10][j] * w->stage_mean_1[5][i] + C[i][11][j] * w->stage_mean_1[6][i] + C[i][12][j] * w->stage_mean_2[0][i] + C[i][13][j] * w->stage_mean_2[1][i] + C[i][14][j] * w->stage_mean_0[32][i];
+      e->v[i][147][j] = direct[i][1][j] + C[i][2][j] * w->stage_mean_0[7][i] + C[i][3][j] * w->stage_mean_0[9][i] + C[i][4][j] * w->stage_mean_0[10][i];
+      e->v[i][148][j] = w->stage_mean_0[1][i];
+    }
+  }
+  for (i = 0; i < GAUSS && fill; ++i) {
+    waiting_matrices((const double (*)[STAGES])e->t[i], (const double (*)[STAGES])e->v[i], f->p, late, e->m[i].B);
+    for (k = 0; k < LATE; ++k) memcpy(e->m[i].A[late_entry[k]], late[k], sizeof late[k]);
+    for (l = 0; l < 13; ++l)
+      for (j = 0; j < count; ++j) {
+        double *block = e->F_0[j] + SQUARE * late_place_0[l][1] + GAUSS * i;
+        for (s = 0; s < GAUSS; ++s) block[s] = -e->h[j] * late[late_place_0[l][0]][j] * gauss_matrix[GAUSS * i + s];
+      }
+    for (l = 0; l < 0; ++l)
+      for (j = 0; j < count; ++j) {
+        double *block = e->F_1[j] + SQUARE * late_place_1[l][1] + GAUSS * i;
+        for (s = 0; s < GAUSS; ++s) block[s] = -e->h[j] * late[late_place_1[l][0]][j] * gauss_matrix[GAUSS * i + s];
+      }
+    for (l = 0; l < 0; ++l)
+      for (j = 0; j < count; ++j) {
+        double *block = e->F_2[j] + SQUARE * late_place_2[l][1] + GAUSS * i;
+        for (s = 0; s < GAUSS; ++s) block[s] = -e->h[j] * late[late_place_2[l][0]][j] * gauss_matrix[GAUSS * i + s];
+      }
+  }
+  (void)f; (void)fill;
+}
+
+/* C and G u at the end of a segment, where the mean is `m` */
+static void evaluate_output_on_grid(Flight *f, double t, const double *m, double *C, double *direct, const int fill) {
+  double v[TABLE_VALUES_1][STAGES], value[TABLE_VALUES_1], y[RESPONSES];
+  int i;
+  if (fill) {
+    t = smaller(larger(t, f->low), f->high);
+    lookup(f, t, v, 0);
+    for (i = 0; i < TABLE_VALUES; ++i) value[i] = v[i][0];
+    output(&t, value, f->p, C, direct);
+    respond(C, direct, m, y);
+    value[146] = y[2];
+    value[147] = y[3];
+    value[148] = m[1];
+    output(&t, value, f->p, C, direct);
+    return;
+  }
+  (void)m; (void)fill;
+  evaluate_output(f, t, C, direct);
+}
+
+/* Return whether a time and an entry were found that are not finite. */
+static int told_not_finite(const Together *e, Failure *why) {
+  int i, j;
+  for (i = 0; i < GAUSS; ++i) {
+    const int entry = not_finite(e->m + i, &j);
+    if (entry >= 0) {
+      why->time = e->t[i][0][j];
+      why->entry = entry;
+      return 1;
+    }
+  }
+  return 0;
+}
+
+/* One segment back, after its mean went forward from m, which is at its end then. */
+static int segment_on_grid(Flight *f, const double *edges, const int steps, OnGrid *w, Together *of, double *m, const int fill,
+                           Counters *done, Failure *why, const volatile int *stop) {
   Segment *g = &w->g;
   int i, j, k, last, first;
   double sum = 0.0;
   memset(g, 0, sizeof *g);
   memset(w->noise, 0, sizeof w->noise);
-  memset(w->known, 0, sizeof w->known);
   memset(w->x_0, 0, sizeof w->x_0);
   w->x_0[0][0] = 1.0;
   w->x_0[1][1] = 1.0;
@@ -6437,6 +7015,7 @@ static int segment_on_grid(Flight *f, const double *edges, const int steps, OnGr
   w->x_0[25][21] = 1.0;
   w->x_0[26][22] = 1.0;
   w->x_0[32][23] = 1.0;
+  for (i = 0; i < 35; ++i) w->mean_0[i] = m[row_0[i]];
   memset(w->x_1, 0, sizeof w->x_1);
   w->x_1[0][0] = 1.0;
   w->x_1[1][1] = 1.0;
@@ -6446,36 +7025,34 @@ static int segment_on_grid(Flight *f, const double *edges, const int steps, OnGr
   w->x_1[5][5] = 1.0;
   w->x_1[6][6] = 1.0;
   w->x_1[10][7] = 1.0;
+  for (i = 0; i < 11; ++i) w->mean_1[i] = m[row_1[i]];
   memset(w->x_2, 0, sizeof w->x_2);
   w->x_2[0][0] = 1.0;
   w->x_2[1][1] = 1.0;
   w->x_2[2][2] = 1.0;
-  for (last = steps; last > 0; last = first) {
-    first = last > SIDE ? last - SIDE : 0;
+  for (i = 0; i < 3; ++i) w->mean_2[i] = m[row_2[i]];
+  for (first = 0; first < steps; first = last) {
+    Together *e = of + first / SIDE;
+    last = first + SIDE < steps ? first + SIDE : steps;
     if (*stop) return STOPPED;
     why->time = edges[first];
-    if (!factorise_steps(f, edges + first, last - first, w)) {
-      for (i = 0; i < GAUSS; ++i) {
-        const int entry = not_finite(w->m + i, &j);
-        if (entry >= 0) {
-          why->time = w->t[i][0][j];
-          why->entry = entry;
-          return NOT_FINITE;
-        }
-      }
-      return NEARLY_SINGULAR;
-    }
+    if (!factorise_steps(f, edges + first, last - first, w, e)) return told_not_finite(e, why) ? NOT_FINITE : NEARLY_SINGULAR;
+    carry_mean_on_grid(f, last - first, w, e, fill);
     done->evaluations += GAUSS * (last - first);
     done->steps += last - first;
-    for (j = last - first - 1; j >= 0; --j) {
-      step_on_grid_0(w->F_0[j], w->m, j, w->x_0, w->X_0, w->noise, w->known);
-      step_on_grid_1(w->F_1[j], w->m, j, w->x_1, w->X_1, w->noise, w->known);
-      step_on_grid_2(w->F_2[j], w->m, j, w->x_2, w->X_2, w->noise, w->known);
-      for (i = 0; i < PRODUCTS; ++i)
-        add_products_on_grid((const double (*)[GAUSS][COLUMNS])w->noise, w->h[j], g->W[noise_source[product[i][0]]], product[i]);
-      for (i = 0; i < GAUSS; ++i)
-        for (k = 0; k < COLUMNS; ++k) g->z[k] += w->h[j] * gauss_weight[i] * w->known[i][k];
-    }
+  }
+  for (i = 0; i < 35; ++i) m[row_0[i]] = w->mean_0[i];
+  for (i = 0; i < 11; ++i) m[row_1[i]] = w->mean_1[i];
+  for (i = 0; i < 3; ++i) m[row_2[i]] = w->mean_2[i];
+  for (k = steps - 1; k >= 0; --k) {
+    const Together *e = of + k / SIDE;
+    j = k % SIDE;
+    if (*stop) return STOPPED;
+    step_on_grid_0(e->F_0[j], e->m, j, w->x_0, w->X_0, w->noise);
+    step_on_grid_1(e->F_1[j], e->m, j, w->x_1, w->X_1, w->noise);
+    step_on_grid_2(e->F_2[j], e->m, j, w->x_2, w->X_2, w->noise);
+    for (i = 0; i < PRODUCTS; ++i)
+      add_products_on_grid((const double (*)[GAUSS][COLUMNS])w->noise, e->h[j], g->W[noise_source[product[i][0]]], product[i]);
   }
   for (i = 0; i < 35; ++i) memcpy(g->transposed[row_0[i]] + 0 * LANES, w->x_0[i], sizeof w->x_0[i]);
   for (i = 0; i < 11; ++i) memcpy(g->transposed[row_1[i]] + 3 * LANES, w->x_1[i], sizeof w->x_1[i]);
@@ -6485,21 +7062,33 @@ static int segment_on_grid(Flight *f, const double *edges, const int steps, OnGr
       for (j = 0; j < i; ++j) g->W[k][i][j] = g->W[k][j][i];
   for (i = 0; i < STATES; ++i)
     for (j = 0; j < COLUMNS; ++j) sum += fabs(g->transposed[i][j]);
-  return isfinite(sum) ? DONE : OUT_OF_RANGE;
+  if (isfinite(sum)) return DONE;
+  for (k = 0; k < steps; k += SIDE)
+    if (told_not_finite(of + k / SIDE, why)) return NOT_FINITE;
+  return OUT_OF_RANGE;
 }
 
-/* Sweep over `count` segments of which number k has steps[k] steps between `edges`; the rest as of sweep. */
+static int most_steps(const int *steps, const int count) {
+  int k, most = 1;
+  for (k = 0; k < count; ++k) most = steps[k] > most ? steps[k] : most;
+  return most;
+}
+
+/* Sweep over `count` segments of which number k has steps[k] steps between `edges`, filling the tables of the mean with
+ * `fill`; the rest as of sweep. */
 EXPORT int sweep_on_grid(int count, const double *end, const double *low, const double *high, const int *steps, const double *edges,
-                         const double *p, const double *tables, double *start_P, double *m, double *covariance, double *mean,
+                         int fill, const double *p, const double *tables, double *start_P, double *m, double *covariance, double *mean,
                          double *transition, double *added, double *counters, double *failure, const volatile int *stop) {
-  double C[C_SIZE], direct[RESPONSES], next[STATES], P[SOURCES_1][COLUMNS][COLUMNS], P_next[SOURCES_1][COLUMNS][COLUMNS];
+  double C[C_SIZE], direct[RESPONSES], P[SOURCES_1][COLUMNS][COLUMNS], P_next[SOURCES_1][COLUMNS][COLUMNS];
   double inherited[SOURCES_1 * RESPONSES];
+  const int most = most_steps(steps, count);
   void *room = malloc(sizeof(OnGrid) + LANES * sizeof(double)); /* vectors want to stand on a multiple of their size */
+  Together *of = (Together *)malloc((most + SIDE - 1) / SIDE * sizeof(Together));
   OnGrid *w = (OnGrid *)(((size_t)room + LANES * sizeof(double) - 1) / (LANES * sizeof(double)) * (LANES * sizeof(double)));
   Flight f;
   Counters done = { 0.0, 0.0, 0.0 };
   Failure why = { 0.0, -1.0 };
-  int i, j, s, k, code = room ? DONE : NEARLY_SINGULAR;
+  int i, j, s, k, code = room && of ? DONE : NEARLY_SINGULAR;
   f.p = p;
   f.tables = tables;
   memset(f.piece, 0, sizeof f.piece);
@@ -6511,10 +7100,10 @@ EXPORT int sweep_on_grid(int count, const double *end, const double *low, const 
     double *result = covariance + k * SOURCES * RESPONSES * RESPONSES;
     f.low = low[k];
     f.high = high[k];
-    code = segment_on_grid(&f, edges, steps[k], w, &done, &why, stop);
+    code = segment_on_grid(&f, edges, steps[k], w, of, m, fill, &done, &why, stop);
     edges += steps[k];
     if (code != DONE) break;
-    evaluate_output(&f, end[k], C, direct);
+    evaluate_output_on_grid(&f, end[k], m, C, direct, fill);
     forward(&w->g, C, (const double (*)[COLUMNS][COLUMNS])P, P_next, result, inherited);
     memcpy(P, P_next, sizeof P);
     for (i = 0; i < SOURCES * RESPONSES * RESPONSES; ++i)
@@ -6522,8 +7111,6 @@ EXPORT int sweep_on_grid(int count, const double *end, const double *low, const 
         why.time = end[k];
         code = OUT_OF_RANGE;
       }
-    carry_mean(&w->g, m, next);
-    memcpy(m, next, sizeof next);
     respond(C, direct, m, mean + k * RESPONSES);
     for (i = 0; i < RESPONSES; ++i)
       if (!(fabs(mean[k * RESPONSES + i]) <= 1e200)) {
@@ -6542,6 +7129,7 @@ EXPORT int sweep_on_grid(int count, const double *end, const double *low, const 
     for (i = 0; i < STATES; ++i)
       for (j = 0; j < STATES; ++j) start_P[(s * STATES + i) * STATES + j] = P[s][place[i]][place[j]];
   free(room);
+  free(of);
   counters[0] = done.steps;
   counters[1] = done.rejected;
   counters[2] = done.evaluations;

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterable
 
 import numpy as np
@@ -13,7 +14,7 @@ ROUNDINGS = 16  # of a time that expressions, tables and a person each compute i
 
 def rounding(time: float, start: float) -> float:
     """Return how far a time of a flight from ``start`` may be from itself, computed in another way, s."""
-    return ROUNDINGS * float(np.finfo(float).eps) * max(abs(time), abs(start))
+    return ROUNDINGS * sys.float_info.epsilon * max(abs(time), abs(start))
 
 
 def switch_times(times: Iterable[float], start: float) -> tuple[float, ...]:

@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 
 from ...codegen.sweep.integrator import CompiledSweep
 from ...codegen.sweep.segments import GridSteps, SegmentResults, Segments
+from ...codegen.system.evaluation import MatrixEvaluator
 from ...codegen.system.executable import ExecutableSystem
 from ...model.errors import IntegrationError
 from .collocation_grid import LIGHT
-from .stability import matrices_at
+from .time_nodes import interval_after
 
 log = logging.getLogger(__name__)
 
@@ -159,7 +160,11 @@ def step_rule(
 
 
 def _light_root(executable: ExecutableSystem, time: float) -> float:
-    roots = np.linalg.eigvals(matrices_at(executable, time)["A"])
+    here = interval_after(executable, time)
+    (A,) = MatrixEvaluator(executable, ("A",))(time, here.low, here.high)
+    if not np.isfinite(A).all():
+        return 0.0  # who steps says what is wrong, and when
+    roots = np.linalg.eigvals(A)
     return float(np.abs(roots[-roots.real < LIGHT * np.abs(roots)]).max(initial=0.0))
 
 

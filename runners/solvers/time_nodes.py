@@ -97,6 +97,8 @@ def time_nodes(executable: ExecutableSystem, times: ArrayLike) -> NDArray[np.flo
     ends = np.clip(np.asarray(times, float), system.start, system.end)
     reach = same_time(system, ends)
     switches = executable.stops(float(ends.max()) + reach).times
+    if _apart(ends, switches, reach, system.start):
+        return ends
     nodes: list[float] = []
     for time in ends:
         node = float(time)
@@ -110,6 +112,15 @@ def time_nodes(executable: ExecutableSystem, times: ArrayLike) -> NDArray[np.flo
             node = nodes[-1]
         nodes.append(max(node, nodes[-1]) if nodes else node)
     return np.array(nodes)
+
+
+def _apart(ends: NDArray[np.float64], switches: NDArray[np.float64], reach: float, start: float) -> bool:
+    """Return whether end times lie so far from the start, from switches and from each other that none is another."""
+    flown = ends - start
+    least = np.maximum(SAME * flown, rounding(float(np.abs(ends).max()), start))
+    if flown.min() <= least.max() or (np.diff(ends) <= least[1:]).any():
+        return False
+    return not switches.size or bool(np.abs(switches[:, None] - ends).min() > reach)
 
 
 def on_flight(system: LinearSystem, times: ArrayLike) -> NDArray[np.bool_]:

@@ -6,10 +6,12 @@ import casadi as ca
 import numpy as np
 import pytest
 
+from ascentwind.codegen.system.executable import executable_system
 from ascentwind.model import LinearSystem, define_system
 from ascentwind.model.errors import TimeRangeError, UnstableSystemWarning
 from ascentwind.runners import CovarianceEquation, Cvodes, Ensemble, Study, Sweep
 from ascentwind.runners.case.times import parse_times
+from ascentwind.runners.solvers import time_nodes as time_nodes_module
 from ascentwind.runners.solvers.discretisation import discretise
 from ascentwind.runners.solvers.time_nodes import interval_after, intervals, time_nodes
 
@@ -194,3 +196,22 @@ def test_times_of_a_grid_are_the_decimals_that_a_person_types(text, times):
 def test_grids_that_name_no_times_are_refused(text):
     with pytest.raises(TimeRangeError):
         parse_times(text)
+
+
+def test_times_far_from_all_else_are_themselves_and_cost_no_search(monkeypatch):
+    """The short way and the search say the same, of times on a grid and of those beside a switch or each other."""
+    executable = executable_system(switching(), compile=False)
+    cases = (
+        [0.5, 2.0, 2.9],
+        [0.5, 2.1],
+        [1.0, 1.0 + 1e-12],
+        [0.0, 2.0],
+        [2.5, 2.5 + 1e-10],
+        [1e-13, 0.5],
+        [2.1 + 1e-9, END],
+    )
+    for times in cases:
+        quick = time_nodes(executable, times)
+        monkeypatch.setattr(time_nodes_module, "_apart", lambda *_: False)
+        np.testing.assert_array_equal(quick, time_nodes(executable, times))
+        monkeypatch.undo()
