@@ -5495,9 +5495,9 @@ typedef struct {
 static void remember(Recent *r, double t, const double *x, const double *rate) {
   if (r->count == POINTS) {
     --r->count;
-    memmove(r->t, r->t + 1, r->count * sizeof r->t[0]);
-    memmove(r->x, r->x + 1, r->count * sizeof r->x[0]);
-    memmove(r->rate, r->rate + 1, r->count * sizeof r->rate[0]);
+    memmove(r->t, r->t + 1, (POINTS - 1) * sizeof r->t[0]);
+    memmove(r->x, r->x + 1, (POINTS - 1) * sizeof r->x[0]);
+    memmove(r->rate, r->rate + 1, (POINTS - 1) * sizeof r->rate[0]);
   }
   r->t[r->count] = t;
   memcpy(r->x[r->count], x, sizeof r->x[0]);
@@ -7083,7 +7083,7 @@ EXPORT int sweep_on_grid(int count, const double *end, const double *low, const 
   double inherited[SOURCES_1 * RESPONSES];
   const int most = most_steps(steps, count);
   void *room = malloc(sizeof(OnGrid) + LANES * sizeof(double)); /* vectors want to stand on a multiple of their size */
-  Together *of = (Together *)malloc((most + SIDE - 1) / SIDE * sizeof(Together));
+  Together *of = (Together *)malloc((size_t)((most + SIDE - 1) / SIDE) * sizeof(Together));
   OnGrid *w = (OnGrid *)(((size_t)room + LANES * sizeof(double) - 1) / (LANES * sizeof(double)) * (LANES * sizeof(double)));
   Flight f;
   Counters done = { 0.0, 0.0, 0.0 };
