@@ -115,13 +115,12 @@ def main() -> None:
             for name in programs[0]:
                 for version, its in zip(versions, programs, strict=True):
                     version.measure(name, its[name])
-            print(f"turn {turn + 1} of {ROUNDS} done", file=sys.stderr, flush=True)
-    show(*versions)
+            show(turn + 1, *versions)
 
 
-def show(own: Version, other: Version | None = None) -> None:
+def show(turns: int, own: Version, other: Version | None = None) -> None:
     """Print the table."""
-    print(f"processor time of this version, least of {ROUNDS} in turn; 'first' with an empty cache of compiled models")
+    print(f"processor time of this version, least of {turns} in turn; 'first' with an empty cache of compiled models")
     heads = ("s", "/ import", "first, s") + ("/ other", "/ its run", "first / other") * (other is not None)
     print(" " * 46 + "".join(f"{head:>14}" for head in heads))
     for name, seconds in own.least.items():
@@ -130,7 +129,10 @@ def show(own: Version, other: Version | None = None) -> None:
         if other is not None:
             run = other.least[f"run {SAME}" if SAME in name else "run as504"]
             numbers += [seconds / other.least[name], seconds / run, first / other.cold.get(name, float("nan"))]
-        print(f"{name:46}" + "".join(f"{number:14.2f}" if number == number else " " * 14 for number in numbers))
+        print(
+            f"{name:46}" + "".join(f"{number:14.2f}" if number == number else " " * 14 for number in numbers),
+            flush=True,
+        )
 
 
 if __name__ == "__main__":
