@@ -131,7 +131,7 @@ def write_profiles(file: Path, count: int, drop: int = -1, levels=(100, 1000, 30
         state = 0.6 * state + 0.8 * random.standard_normal(state.shape)
         for j, h in enumerate(levels):
             if not (i == drop and j == 1):
-                day = np.datetime64("2020-01-01") + i
+                day = np.datetime64("2020-01-01") + np.timedelta64(i, "D")
                 lines.append(f"p{i},{day},{h},{5 + 3 * state[0, j]:.4f},{2 * state[1, j]:.4f}")
     file.write_text("\n".join(lines) + "\n")
     return file

@@ -170,7 +170,7 @@ def test_ones_own_pairs_give_the_persistence_back(as504):
         x.append(rho * x[-1] + np.sqrt(1 - rho**2) * random.standard_normal(rho.size))
     levels = np.array([1000.0, 3000.0, 6000.0, 9000.0])
     u = field.wind.mean[0] + np.array(x) @ field.rows(levels).T
-    time = np.datetime64("2003-03-01T00:00", "m") + 360 * np.arange(count)
+    time = np.datetime64("2003-03-01T00:00", "m") + np.timedelta64(360, "m") * np.arange(count)
     read = Soundings(levels, u, 0 * u, time, tuple(map(str, range(count))), "", "drawn", hours_stated=True)
     found = as504.persistence(read)
     assert found.hours == pytest.approx(30.0, rel=0.15)
