@@ -123,8 +123,7 @@ def step_rule(
     explicit_steps : int
         Those of the explicit formula at the same tolerance.
     fills : bool
-        Let the sweep fill the tables of the mean response itself. The finer grid, that tells the error, takes them
-        as they are filled in ``nominal``.
+        Let the sweep fill the tables of the mean response itself.
 
     Raises
     ------
@@ -142,8 +141,7 @@ def step_rule(
         if rule.steps(segments).counts.sum() > GAIN * explicit_steps:
             break
         try:
-            coarse, fine = rule.swept(compiled, nominal, segments), replace(rule, fills=False)
-            error = MARGIN * _apart(coarse, fine.swept(compiled, nominal, segments, 2.0))
+            error = MARGIN * _apart(*(rule.swept(compiled, nominal, segments, finer) for finer in (1.0, 2.0)))
         except IntegrationError:
             break
         wanted = (0.4 * tolerance / max(error, 1e-3 * tolerance)) ** (1 / ORDER)

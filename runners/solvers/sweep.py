@@ -240,11 +240,8 @@ def rule_for(
         nominal = fill(numbers, forward_mean(compiled, 1e-2 * relative_tolerance))
         segments = _segments_of(nominal, time_nodes(nominal, ends), longest_segment(float(ends[-1] - system.start)))
         controlled = swept(compiled, nominal, segments, relative_tolerance, steps=False).counters["steps"]
-        for fills in (True, False) if compiled.fills_means and fill is with_mean_tables else (False,):
-            rule = step_rule(compiled, nominal, segments, relative_tolerance, controlled, fills)
-            if rule is not None:
-                return rule
-        return None
+        fills = compiled.fills_means and fill is with_mean_tables
+        return step_rule(compiled, nominal, segments, relative_tolerance, controlled, fills)
     except AscentwindError:
         return None  # the members say what is wrong
 
