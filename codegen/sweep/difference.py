@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ...model.errors import AscentwindError
+from ...model.errors import AscentwindError, IntegrationError
 from ...model.tables import table_values
 from ..system.functions import declared_sizes, state_scales
 from ..system.nominal import NominalNumbers
@@ -17,6 +17,7 @@ AGREEMENT = 1e-7  # of scaled numbers; a wrong library is off in the first digit
 STEP_TIMES_ROOT, LONGEST, SHORTEST = 0.1, 1e-2, 1e-6  # s, of what is integrated; the interpreter takes one step
 POINTS = 3  # one that agrees is enough: an undeclared jump may lie within another
 TOLERANCE = 1e-8
+LEAST_SIZE = 1e-10  # of the largest, for a second try
 LEAST_CHANGE = 1e-6  # of the identity: below, what a step adds to it drowns in rounding
 
 
@@ -62,7 +63,12 @@ def _difference_at(sweep: CompiledSweep, numbers: NominalNumbers, time: float) -
     sizes = np.sqrt(np.concatenate([np.einsum("sii->i", P) + m**2, variance.sum(axis=0) + response**2]))
     sizes = np.where(sizes > 0, sizes, declared_sizes(system))
     try:
-        found = sweep.integrate(numbers, segments, TOLERANCE, state, sizes, steps=True)
+        try:
+            found = sweep.integrate(numbers, segments, TOLERANCE, state, sizes, steps=True)
+        except IntegrationError:
+            # in so short a time noise reaches far states as a high power of it, or not at all: sizes say nothing then
+            sizes, state = np.maximum(sizes, LEAST_SIZE * sizes.max()), np.zeros((s, n, n))
+            found = sweep.integrate(numbers, segments, TOLERANCE, state, sizes, steps=True)
         means, outputs, _ = sweep.mean_history(numbers, segments, TOLERANCE, sizes)
         on_grid, grid_state = found, state
         if sweep.takes_a_grid:

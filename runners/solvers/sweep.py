@@ -24,6 +24,7 @@ from ...codegen.toolchain.interruption import Workers
 from ...codegen.toolchain.library import InterpreterWarning
 from ...model.errors import AscentwindError, IntegrationError, TimeRangeError
 from ...model.system.linear_system import LinearSystem
+from ..present.progress import each
 from .cores import available_cores
 from .fixed_grid import LEAST_TOLERANCE as GRID_TOLERANCE
 from .fixed_grid import StepRule, step_rule
@@ -402,7 +403,7 @@ def batch(
             return error
 
     with Workers(threads) as pool:
-        found = list(pool.map(one, parameter_sets))
+        found = list(each(pool.map(one, parameter_sets), "members", len(parameter_sets)))
     completed = {k: member for k, member in enumerate(found) if isinstance(member, SweepResult)}
     if len(completed) < len(found):
         raise BatchError({k: e for k, e in enumerate(found) if isinstance(e, AscentwindError)}, completed)

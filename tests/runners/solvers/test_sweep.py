@@ -92,6 +92,24 @@ def oscillator_chain(count):
     )
 
 
+def test_a_chain_whose_far_end_noise_reaches_as_a_high_power_of_time_is_not_refused():
+    """In the time over which a compiled sweep is checked, the far states move by 1e-18 or not at all."""
+    t, noise, count = ca.SX.sym("t"), ca.SX.sym("noise"), 10
+    x, v = ca.SX.sym("x", count), ca.SX.sym("v", count)
+    states = {}
+    for i, w in enumerate(np.geomspace(1.0, 20.0, count)):
+        pull = sum(0.1 * (x[k] - x[i]) for k in (i - 1, i + 1) if 0 <= k < count)
+        force = -(w**2) * (1 + 0.01 * t) * x[i] - 0.04 * w * v[i] + pull + (noise if i == 0 else 0)
+        states |= {f"x{i}": (x[i], v[i]), f"v{i}": (v[i], force)}
+    system = define_system(
+        "far", time=t, states=states, noises={"noise": noise}, outputs={"first": x[0], "second": x[1]}, end=20.0
+    )
+    executable = executable_system(system)
+    found = sweep(compiled_sweep(system), executable, [5.0, 20.0], relative_tolerance=1e-8)
+    expected = covariance_equation(executable, [5.0, 20.0], 1e-11).variance
+    np.testing.assert_allclose(found.variance, expected, rtol=1e-7)
+
+
 @pytest.mark.slow
 def test_agrees_with_cvodes_and_the_covariance_equation_at_ten_times(as504, reference):
     engine, executable, _ = as504
