@@ -102,7 +102,7 @@ def test_a_chain_whose_far_end_noise_reaches_as_a_high_power_of_time_is_not_refu
         force = -(w**2) * (1 + 0.01 * t) * x[i] - 0.04 * w * v[i] + pull + (noise if i == 0 else 0)
         states |= {f"x{i}": (x[i], v[i]), f"v{i}": (v[i], force)}
     system = define_system(
-        "far", time=t, states=states, noises={"noise": noise}, outputs={"first": x[0], "second": x[1]}, end=20.0
+        "far", time=t, states=states, noises={"noise": noise}, outputs={"first": x[0], "second": x[1]}, end=100.0
     )
     executable = executable_system(system)
     found = sweep(compiled_sweep(system), executable, [5.0, 20.0], relative_tolerance=1e-8)
