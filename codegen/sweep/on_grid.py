@@ -121,7 +121,7 @@ def _filled_values(filled: FilledMeans, kinds: Sequence[Kind], names: Mapping[st
     C = filled.outputs.sparsity_out(0)
     rows = [[(k, own[j]) for k, (i, j) in enumerate(zip(C.row(), C.get_col(), strict=True)) if i == row]
             for row in range(C.size1())]  # fmt: skip
-    side = dict.fromkeys(("t", "v", "C", "direct", "late", "B"), "j")
+    side: dict[str, str] = dict.fromkeys(("t", "v", "C", "direct", "late", "B"), "j")
     return {
         "outputs": [(value, output, row) for (value, output), row in zip(filled.from_outputs, rows, strict=True)],
         "states": [(value, state, own[state]) for value, state in filled.from_states],

@@ -30,7 +30,7 @@ class Segments:
         """Where each begins, (k,), s."""
         return np.concatenate([[self.start], self.end[:-1]])
 
-    def cut(self, pieces: NDArray[np.intp]) -> Segments:
+    def cut(self, pieces: NDArray[np.integer]) -> Segments:
         """Return every segment in as many equal pieces as asked."""
         ends = equal_parts(self, pieces)
         return Segments(self.start, ends, np.repeat(self.low, pieces), np.repeat(self.high, pieces))

@@ -54,6 +54,8 @@ def test_drawn_times(ends, stops):
         assert stop in found
         if 0 < stop < 10:
             assert any(0 < t - stop < 1e-4 for t in found)
+            after = [t for t in found if stop <= t <= min(stop + 1.0, 10.0)]
+            assert max(np.diff(after)) < 0.0061, "what rings after a stop is drawn finely"
 
 
 def test_one_time_is_drawn_as_it_is():
