@@ -28,7 +28,7 @@ OF_MEMBERS = 1e-4
 REPEATS = 15
 
 
-def table(study: aw.Study) -> Callable[[], None]:
+def table(study: aw.Study) -> Callable[[], object]:
     """Return what computes a table: all end times, sources and covariances."""
     engine, filled = sweep_of(study.executable), study.with_means
     return lambda: sweep(engine, filled, TIMES, relative_tolerance=TOLERANCE)
