@@ -30,7 +30,7 @@ from ..gusts.weights import WindWeights, weights_of_rows
 from ..present.notebook import html_of
 from ..present.progress import steps
 from ..solvers.time_nodes import interval_before, time_nodes
-from ..statistics.engines import response_statistics
+from ..statistics.engines import engine_with_covariances, response_statistics
 from ..statistics.norm import NormOfNormal
 from ..statistics.resultants import outputs_of, response_or_resultant
 from .files import write_wind
@@ -380,7 +380,7 @@ def _behind(
     here = interval_before(case.with_means, node)
     C, G, inputs = MatrixEvaluator(case.with_means, ("C", "G", "inputs"))(node, here.low, here.high)
     means = C[rows] @ case.mean_states(np.array([node]))[0] + G[rows] @ inputs[:, 0]
-    engine = "covariance" if len(rows) > 1 and case.executable.shared_library is None else None
+    engine = engine_with_covariances(case) if len(rows) > 1 else None
     found = response_statistics(case, [end], responses=outputs, engine=engine)
     by_source = _covariances(found.dataset, outputs)
     factors, direction = np.ones(1), None

@@ -18,7 +18,7 @@ from ...model.system.names import COMBINED, TURBULENCE, WIND
 from ...model.vehicle.biases import WIND_BIAS
 from ..case.provenance import provenance
 from ..present.netcdf import RULE
-from ..statistics.engines import response_statistics
+from ..statistics.engines import engine_with_covariances, response_statistics
 from ..statistics.norm import NormOfNormal
 from ..statistics.percentiles import instant_level
 from .clocking import Quantities, towards
@@ -65,8 +65,7 @@ def combined_loads(sweep: GustSweep) -> xr.Dataset:
     times = sorted({each.time for each in worst})
     quantities = Quantities.of(sweep.case, sweep.responses)
     with_covariance = any(len(members) > 1 for members in quantities.members)
-    interpreted = sweep.case.executable.shared_library is None
-    engine = "covariance" if with_covariance and interpreted else None  # norms need covariances between responses
+    engine = engine_with_covariances(sweep.case) if with_covariance else None  # of norms
     found = response_statistics(sweep.case, times, responses=quantities.outputs, engine=engine)
     sheet: dict[str, list[float]] = {name: [] for name in MEANINGS}
     for each, members in zip(worst, quantities.members, strict=True):

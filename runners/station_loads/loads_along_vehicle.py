@@ -34,7 +34,7 @@ from ..present.progress import steps
 from ..solvers.time_nodes import interval_before, time_nodes
 from ..statistics.dataset import QUANTITIES
 from ..statistics.engine import Engine
-from ..statistics.engines import response_statistics
+from ..statistics.engines import engine_with_covariances, response_statistics
 from ..statistics.norm import LIKE_3_SIGMA, NormOfNormal
 from ..statistics.percentiles import checked_probabilities
 from ..statistics.results import ResponseStatistics
@@ -204,9 +204,8 @@ def every_load_along_vehicle(
         for table in _tables(load):
             station_table(vehicle, table)
     components = _with_components(case, vehicle)
-    if engine is None:
-        engine = "covariance" if case.executable.shared_library is None else "sweep"
-    found = response_statistics(components, times, responses=_components(vehicle), engine=engine)
+    chosen = engine_with_covariances(case) if engine is None else engine
+    found = response_statistics(components, times, responses=_components(vehicle), engine=chosen)
     if "covariance" not in found:
         raise IntegrationError(f"engine '{found.attrs['engine']}' gives no covariances; use sweep or covariance")
     return [_dataset(case, components, vehicle, load, found, slosh_reaction) for load in loads]
@@ -258,7 +257,7 @@ def resultant_along_vehicle(
     (probability,) = checked_probabilities(probability)
     components = _with_components(case, vehicle)
     names = [[plane.prefix + name for name in _components(plane.vehicle)] for plane in planes]
-    engine = "covariance" if case.executable.shared_library is None else "sweep"
+    engine = engine_with_covariances(case)
     found = response_statistics(components, times, responses=[*names[0], *names[1]], engine=engine)
     at = found["time"].values
     along = [_along(components, p.vehicle, load, at, slosh_reaction, p.scope) for p in planes]

@@ -99,6 +99,11 @@ def engine_from(name: str | None, *, compiled: bool = True, **settings: object) 
     return ENGINES[name](**given)  # type: ignore[arg-type]
 
 
+def engine_with_covariances(case: Case) -> str:
+    """Return the engine that gives covariances between responses: the sweep or, where nothing is compiled, another."""
+    return CovarianceEquation.name if case.executable.shared_library is None else Sweep.name
+
+
 def engine_of_options(engine: str | Engine | None, options: object | None) -> str | Engine | None:
     """Return what the old argument ``options`` stood for: an engine is its own options now.
 
