@@ -71,8 +71,9 @@ def planar_mean(vehicle: Vehicle, executable: ExecutableSystem) -> PlanarMean:
     for interval in intervals(executable, system.start, system.end, pulses=False):
         inside = knots[(knots > interval.begin) & (knots <= interval.end)]
         # piece by piece, so that a flight that diverges is told before it tumbles
-        runs = np.cumsum([points for _, _, points in equidistant(interval, inside)])[:-1]
-        for piece in np.split(inside, np.unique([*runs, *range(PIECE, inside.size, PIECE)]).astype(int)):
+        runs = np.cumsum([points for _, _, points in equidistant(interval, inside)]).tolist()
+        cuts = {cut for cut in (*runs, *range(PIECE, inside.size, PIECE)) if cut < inside.size}
+        for piece in np.split(inside, sorted(cuts)):
             begin = times[-1][-1]
             parameters = np.array([begin, piece[-1] - begin, interval.low, interval.high])
             where = f"of the nonlinear mean response from {begin:g} s to {piece[-1]:g} s"
