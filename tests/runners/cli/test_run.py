@@ -89,9 +89,9 @@ def test_sensitivity_ranks_and_writes(ascentwind, tmp_path, as504):
         assert (tmp_path / "found" / f"sensitivity_{name}.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_inspect_as_json_is_what_the_study_says(ascentwind, as504):
+def test_inspect_as_json_is_what_the_study_says(ascentwind):
     found = json.loads(ascentwind("inspect", "as504", "--time", "75", "--json"))
-    A, B, C, D = as504.matrices(75.0)
+    A, B, C, D = Study.load("as504", compile=False).matrices(75.0)  # the command compiles nothing either
     for name, matrix in zip("ABCD", (A, B, C, D), strict=True):
         np.testing.assert_array_equal(np.array(found[name]).reshape(matrix.shape), matrix)
     tables = {row["name"]: row for row in found["tables"]}
