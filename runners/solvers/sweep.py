@@ -170,7 +170,7 @@ def sweep(
     found = _at_nodes(executable, segments, nodes, ends, result)
     if result.transition is None:
         return found
-    at = np.where(nodes > compiled.system.start, np.searchsorted(segments.end, nodes), -1)
+    at = _segment_of(segments, nodes)
     return replace(found, weighting=_weighting_functions(executable, segments, at, result.transition))
 
 
@@ -192,12 +192,17 @@ def _at_nodes(
     result: SegmentResults,
 ) -> SweepResult:
     """Take from the ends of segments what was asked for; at the start nothing has acted yet."""
-    at = np.where(nodes > executable.system.start, np.searchsorted(segments.end, nodes), -1)
+    at = _segment_of(segments, nodes)
     found = result.covariance[at], result.mean[at], result.error[at]
     if at[0] < 0:
         for array, value in zip(found, _at_start(executable, segments), strict=True):
             array[at < 0] = value
     return SweepResult(ends, *found, result.counters)
+
+
+def _segment_of(segments: Segments, nodes: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Return the number of the segment that ends at each node; -1 at the start."""
+    return np.where(nodes > segments.start, np.searchsorted(segments.end, nodes), -1)
 
 
 def _segments_of(executable: ExecutableSystem, nodes: NDArray[np.float64], longest: float) -> Segments:
@@ -337,17 +342,16 @@ def sweep_member(
     TimeRangeError, DirectNoiseError, IntegrationError, DataError
     """
     ends = _checked(compiled.system, times, relative_tolerance, responses)
+    respond = forward_mean(compiled, 1e-2 * relative_tolerance)
     # at the start nothing has stepped yet that could fill a table
-    if rule is not None and rule.fills and ends[0] > compiled.system.start:
-        found = _on_grid(compiled, numbers, ends, rule)
-        if found is not None:
-            return found
-        rule = None
-    member = fill(numbers, forward_mean(compiled, 1e-2 * relative_tolerance))
+    fills = rule is not None and rule.fills and time_nodes(numbers, ends[:1])[0] > compiled.system.start
+    member = numbers if fills else fill(numbers, respond)
     if rule is not None:
-        found = _on_grid(compiled, member, ends, replace(rule, fills=False))
+        found = _on_grid(compiled, member, ends, replace(rule, fills=fills))
         if found is not None:
             return found
+    if fills:
+        member = fill(numbers, respond)
     return sweep(compiled, member, ends, relative_tolerance=relative_tolerance, responses=responses)
 
 
@@ -444,8 +448,7 @@ def interpreted_weighting(executable: ExecutableSystem, times: ArrayLike, spacin
             raise IntegrationError(f"the transition from {begin:g} s to {end:g} s: {found.message}")
         transitions.append(found.y[:, -1].reshape(n, n) * scale[:, None] / scale)
         begin = end
-    at = np.where(nodes > system.start, np.searchsorted(segments.end, nodes), -1)
-    return _weighting_functions(executable, segments, at, np.array(transitions))
+    return _weighting_functions(executable, segments, _segment_of(segments, nodes), np.array(transitions))
 
 
 def check_times(system: LinearSystem, times: ArrayLike) -> NDArray[np.float64]:
