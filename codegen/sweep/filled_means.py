@@ -7,13 +7,13 @@ no known input reaches, such as those of a noise filter, which nothing else driv
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import casadi as ca
 
 from ...model.system.linear_system import LinearSystem
 from ..system.functions import direct_response, known_rate
+from .kinds import reaching
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,21 +41,19 @@ class FilledMeans:
 
 def filled_means(system: LinearSystem) -> FilledMeans | None:
     """Return how a sweep of a system can fill its tables of the mean; None where it has none, or cannot."""
-    tables = [source for g in system.tables for source in (g.sources or (None,) * len(g.names))]
-    sources = {value: source for value, source in enumerate(tables) if source is not None}
+    sources = system.mean_sources
     if not sources:
         return None
     of_mean, at = system.v[list(sources)], [system.time, system.v, system.p]
-    states = {s.name: i for i, s in enumerate(system.states)}
-    from_outputs = tuple((v, system.output_index(name)) for v, (kind, name) in sources.items() if kind == "output")
-    from_states = tuple((v, states[name]) for v, (kind, name) in sources.items() if kind == "state")
+    from_outputs = tuple((value, i) for value, (kind, i) in sources.items() if kind == "output")
+    from_states = tuple((value, i) for value, (kind, i) in sources.items() if kind == "state")
     A, B, known = ca.SX(system.A), ca.SX(system.B), known_rate(system)
     rows = [output for _, output in from_outputs]
     C, direct = ca.SX(system.C)[rows, :], direct_response(system)[rows]
-    moved = _moved(A.sparsity(), ca.sparsify(known).row())
     late = _depending(A, of_mean)
-    held = [A.sparsity().get_col()[k] for k in late] + [C.sparsity().get_col()[k] for k in _depending(C, of_mean)]
-    if moved & set(held) or _depending(ca.vertcat(known, direct), of_mean):
+    held = {A.sparsity().get_col()[k] for k in late} | {C.sparsity().get_col()[k] for k in _depending(C, of_mean)}
+    reached, driven = reaching(A.sparsity()), set(ca.sparsify(known).row())
+    if any(reached[state] & driven for state in held) or _depending(ca.vertcat(known, direct), of_mean):
         return None
     waiting = ca.cse([ca.vertcat(*(A.nz[k] for k in late)) if late else ca.SX.zeros(0), B])
     return FilledMeans(
@@ -71,16 +69,3 @@ def _depending(matrix: ca.SX, on: ca.SX) -> list[int]:
     """Return the nonzeros of a matrix that depend on symbols."""
     values = ca.vertcat(*(matrix.nz[k] for k in range(matrix.nnz()))) if matrix.nnz() else ca.SX.zeros(0)
     return sorted(set(ca.jacobian(values, on).sparsity().row()))
-
-
-def _moved(A: ca.Sparsity, driven: Iterable[int]) -> set[int]:
-    """Return the states that known inputs reach, which drive those of ``driven``."""
-    feeds: list[list[int]] = [[] for _ in range(A.size1())]
-    for i, j in zip(A.row(), A.get_col(), strict=True):
-        feeds[j].append(i)
-    found, waiting = set(driven), list(driven)
-    while waiting:
-        new = [i for i in feeds[waiting.pop()] if i not in found]
-        found.update(new)
-        waiting += new
-    return found

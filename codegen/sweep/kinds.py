@@ -37,6 +37,14 @@ class Kind:
     blocks: int
 
 
+def entries(sparsity: ca.Sparsity, by_row: bool) -> list[list[tuple[int, int]]]:
+    """Return for every row (or column) its nonzeros as (number of the nonzero, column (or row))."""
+    found: list[list[tuple[int, int]]] = [[] for _ in range(sparsity.size1() if by_row else sparsity.size2())]
+    for k, (i, j) in enumerate(zip(sparsity.row(), sparsity.get_col(), strict=True)):
+        found[i if by_row else j].append((k, j if by_row else i))
+    return found
+
+
 def reaching(A: ca.Sparsity) -> list[frozenset[int]]:
     """Return for every state those that reach it by A, itself among them."""
     found = [{i} for i in range(A.size1())]

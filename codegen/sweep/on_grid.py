@@ -11,7 +11,7 @@ from ..nodes.elimination import elimination_plan
 from ..toolchain.c_printer import c_statements
 from .filled_means import FilledMeans
 from .gauss_legendre import FROM_STAGES, NODES, TABLEAU, WEIGHTS
-from .kinds import Kind
+from .kinds import Kind, entries
 
 MOST_BLOCKS = 1000  # of a kind, 128 B each for every step side by side; a system whose states all meet has n^2
 WIDEST = 4  # blocks of columns side by side: 16 sums in 32 registers
@@ -119,8 +119,7 @@ def _filled_values(filled: FilledMeans, kinds: Sequence[Kind], names: Mapping[st
     """Return how the C fills the tables of the mean; states by kind and row."""
     own = {state: (kind.index, kind.rows.index(state)) for kind in kinds for state in kind.states}
     C = filled.outputs.sparsity_out(0)
-    rows = [[(k, own[j]) for k, (i, j) in enumerate(zip(C.row(), C.get_col(), strict=True)) if i == row]
-            for row in range(C.size1())]  # fmt: skip
+    rows = [[(k, own[state]) for k, state in row] for row in entries(C, by_row=True)]
     side: dict[str, str] = dict.fromkeys(("t", "v", "C", "direct", "late", "B"), "j")
     return {
         "outputs": [(value, output, row) for (value, output), row in zip(filled.from_outputs, rows, strict=True)],

@@ -15,7 +15,7 @@ from ..toolchain.c_printer import c_function, c_statements, enumerators
 from ..toolchain.fingerprint import fingerprint
 from ..toolchain.templates import render
 from .filled_means import FilledMeans, filled_means
-from .kinds import Kind, Span, kinds, spans
+from .kinds import Kind, Span, entries, kinds, spans
 from .on_grid import TEMPLATE, grid_arguments
 from .runge_kutta import DOP853, RungeKutta
 
@@ -80,7 +80,7 @@ def sweep_source(
     weighted = [i for i, b in enumerate(formula.weights) if b != 0.0]
     of = kinds(A, LANES)
     place, own_row = _places(of, n)
-    by_noise = _entries(B, by_row=False)
+    by_noise = entries(B, by_row=False)
     columns = [by_noise[i] for i, _ in noises]
     reached = [spans(of, (row for _, row in column), LANES) for column in columns]
     kind_values = [_kind(kind, A, columns, known.row()) for kind in of]
@@ -111,11 +111,11 @@ def sweep_source(
             stage, ("t", "v", "p"), ("A", "B", "known"), names, dict.fromkeys(("t", "v", "A", "B", "known"), "j")
         ),
         output_function=c_function("output", functions.output, ("t", "v", "p"), ("C", "direct"), names),
-        rows=_entries(A, by_row=True),
+        rows=entries(A, by_row=True),
         noise_columns=columns,
         noise_sources=[k for _, k in noises],
         known_rows=known.row(),
-        output_rows=_entries(C, by_row=True),
+        output_rows=entries(C, by_row=True),
         formula=formula,
         weighted=weighted,
     )
@@ -146,7 +146,7 @@ def _places(of: Sequence[Kind], states: int) -> tuple[list[int], list[int]]:
 def _kind(kind: Kind, A: ca.Sparsity, noises: list[list[tuple[int, int]]], known: list[int]) -> dict[str, object]:
     """Return what a kind of blocks is written from: entries of A, B and E u by the rows that they have in it."""
     at = {state: row for row, state in enumerate(kind.rows)}
-    by_state = _entries(A, by_row=False)
+    by_state = entries(A, by_row=False)
     within = [[(k, at[i]) for k, i in column if i in at] for column in noises]
     return {
         "index": kind.index,
@@ -158,11 +158,3 @@ def _kind(kind: Kind, A: ca.Sparsity, noises: list[list[tuple[int, int]]], known
         "noises": [(n, column) for n, column in enumerate(within) if column],
         "known": [(n, at[i]) for n, i in enumerate(known) if i in at],
     }
-
-
-def _entries(sparsity: ca.Sparsity, by_row: bool) -> list[list[tuple[int, int]]]:
-    """Return for every row (or column) its nonzeros as (number of the nonzero, column (or row))."""
-    found: list[list[tuple[int, int]]] = [[] for _ in range(sparsity.size1() if by_row else sparsity.size2())]
-    for k, (i, j) in enumerate(zip(sparsity.row(), sparsity.get_col(), strict=True)):
-        found[i if by_row else j].append((k, j if by_row else i))
-    return found

@@ -4085,6 +4085,14 @@ static inline void multiply_blocks(const Eight *restrict below, const Eight *rig
   }
 }
 
+/* x less the sum of F y over listed blocks */
+static inline Four less_blocks(const double *F, const int *block, const int *state, const int first, const int last, double (*X)[GAUSS], Four x) {
+  int l, s;
+  for (l = first; l < last; ++l)
+    for (s = 0; s < GAUSS; ++s) x -= load_four(F + SQUARE * block[l] + GAUSS * s) * X[state[l]][s];
+  return x;
+}
+
 /* Kind 0: 31 states, 214 blocks */
 static const int pivot_0[31] = { 29, 30, 3, 4, 5, 7, 8, 9, 10, 6, 11, 18, 19, 20, 21, 13, 1, 14, 15, 26, 27, 28, 12, 0, 2, 16, 17, 22, 23, 24, 25 };
 static const int diagonal_0[31] = { 0, 1, -1, -1, -1, -1, -1, -1, -1, 5, 10, -1, -1, -1, -1, 20, -1, -1, -1, 21, 23, 25, 30, 39, 50, 66, 83, 101,
@@ -4183,14 +4191,6 @@ static int factorise_0(const Matrices *restrict m, const double *restrict h, Eig
   return 1;
 }
 
-/* x less the sum of F y over listed blocks */
-static inline Four less_blocks_0(const double *F, const int *block, const int *state, const int first, const int last, double (*X)[GAUSS], Four x) {
-  int l, s;
-  for (l = first; l < last; ++l)
-    for (s = 0; s < GAUSS; ++s) x -= load_four(F + SQUARE * block[l] + GAUSS * s) * X[state[l]][s];
-  return x;
-}
-
 /* One step forward with the mean x of the rows of kind 0; X is what it is at the stages */
 static void mean_on_grid_0(const double *restrict F, const Matrices *restrict m, const double h, const int lane, double *restrict x, double (*restrict X)[GAUSS]) {
   int i, s;
@@ -4208,7 +4208,7 @@ static void mean_on_grid_0(const double *restrict F, const Matrices *restrict m,
   }
   for (i = 0; i < 31; ++i) {
     const int own = pivot_0[i], diagonal = diagonal_0[i];
-    Four y = less_blocks_0(F, left_block_0, left_state_0, left_start_0[i], left_start_0[i + 1], X, load_four(X[own]));
+    Four y = less_blocks(F, left_block_0, left_state_0, left_start_0[i], left_start_0[i + 1], X, load_four(X[own]));
     if (diagonal != UNIT) {
       const double *f = F + SQUARE * diagonal;
       y = (load_four(f) * y[0] + load_four(f + GAUSS) * y[1]) + (load_four(f + 2 * GAUSS) * y[2] + load_four(f + 3 * GAUSS) * y[3]);
@@ -4217,7 +4217,7 @@ static void mean_on_grid_0(const double *restrict F, const Matrices *restrict m,
   }
   for (i = 30; i >= 0; --i) {
     const int own = pivot_0[i];
-    const Four y = less_blocks_0(F, right_block_0, right_state_0, right_start_0[i], right_start_0[i + 1], X, load_four(X[own]));
+    const Four y = less_blocks(F, right_block_0, right_state_0, right_start_0[i], right_start_0[i + 1], X, load_four(X[own]));
     memcpy(X[own], &y, sizeof y);
     x[own] += (gauss_end[0] * y[0] + gauss_end[1] * y[1]) + (gauss_end[2] * y[2] + gauss_end[3] * y[3]);
   }

@@ -6122,6 +6122,14 @@ static inline void multiply_blocks(const Eight *restrict below, const Eight *rig
   }
 }
 
+/* x less the sum of F y over listed blocks */
+static inline Four less_blocks(const double *F, const int *block, const int *state, const int first, const int last, double (*X)[GAUSS], Four x) {
+  int l, s;
+  for (l = first; l < last; ++l)
+    for (s = 0; s < GAUSS; ++s) x -= load_four(F + SQUARE * block[l] + GAUSS * s) * X[state[l]][s];
+  return x;
+}
+
 /* Kind 0: 35 states, 252 blocks */
 static const int pivot_0[35] = { 33, 34, 3, 5, 22, 24, 26, 4, 6, 13, 14, 15, 25, 23, 21, 8, 20, 1, 9, 10, 27, 28, 29, 30, 31, 32, 19, 7, 0, 2,
   11, 12, 16, 17, 18 };
@@ -6229,14 +6237,6 @@ static int factorise_0(const Matrices *restrict m, const double *restrict h, Eig
   return 1;
 }
 
-/* x less the sum of F y over listed blocks */
-static inline Four less_blocks_0(const double *F, const int *block, const int *state, const int first, const int last, double (*X)[GAUSS], Four x) {
-  int l, s;
-  for (l = first; l < last; ++l)
-    for (s = 0; s < GAUSS; ++s) x -= load_four(F + SQUARE * block[l] + GAUSS * s) * X[state[l]][s];
-  return x;
-}
-
 /* One step forward with the mean x of the rows of kind 0; X is what it is at the stages */
 static void mean_on_grid_0(const double *restrict F, const Matrices *restrict m, const double h, const int lane, double *restrict x, double (*restrict X)[GAUSS]) {
   int i, s;
@@ -6255,7 +6255,7 @@ static void mean_on_grid_0(const double *restrict F, const Matrices *restrict m,
   }
   for (i = 0; i < 35; ++i) {
     const int own = pivot_0[i], diagonal = diagonal_0[i];
-    Four y = less_blocks_0(F, left_block_0, left_state_0, left_start_0[i], left_start_0[i + 1], X, load_four(X[own]));
+    Four y = less_blocks(F, left_block_0, left_state_0, left_start_0[i], left_start_0[i + 1], X, load_four(X[own]));
     if (diagonal != UNIT) {
       const double *f = F + SQUARE * diagonal;
       y = (load_four(f) * y[0] + load_four(f + GAUSS) * y[1]) + (load_four(f + 2 * GAUSS) * y[2] + load_four(f + 3 * GAUSS) * y[3]);
@@ -6264,7 +6264,7 @@ static void mean_on_grid_0(const double *restrict F, const Matrices *restrict m,
   }
   for (i = 34; i >= 0; --i) {
     const int own = pivot_0[i];
-    const Four y = less_blocks_0(F, right_block_0, right_state_0, right_start_0[i], right_start_0[i + 1], X, load_four(X[own]));
+    const Four y = less_blocks(F, right_block_0, right_state_0, right_start_0[i], right_start_0[i + 1], X, load_four(X[own]));
     memcpy(X[own], &y, sizeof y);
     x[own] += (gauss_end[0] * y[0] + gauss_end[1] * y[1]) + (gauss_end[2] * y[2] + gauss_end[3] * y[3]);
   }
@@ -6358,14 +6358,6 @@ static int factorise_1(const Matrices *restrict m, const double *restrict h, Eig
   return 1;
 }
 
-/* x less the sum of F y over listed blocks */
-static inline Four less_blocks_1(const double *F, const int *block, const int *state, const int first, const int last, double (*X)[GAUSS], Four x) {
-  int l, s;
-  for (l = first; l < last; ++l)
-    for (s = 0; s < GAUSS; ++s) x -= load_four(F + SQUARE * block[l] + GAUSS * s) * X[state[l]][s];
-  return x;
-}
-
 /* One step forward with the mean x of the rows of kind 1; X is what it is at the stages */
 static void mean_on_grid_1(const double *restrict F, const Matrices *restrict m, const double h, const int lane, double *restrict x, double (*restrict X)[GAUSS]) {
   int i, s;
@@ -6377,7 +6369,7 @@ static void mean_on_grid_1(const double *restrict F, const Matrices *restrict m,
   }
   for (i = 0; i < 11; ++i) {
     const int own = pivot_1[i], diagonal = diagonal_1[i];
-    Four y = less_blocks_1(F, left_block_1, left_state_1, left_start_1[i], left_start_1[i + 1], X, load_four(X[own]));
+    Four y = less_blocks(F, left_block_1, left_state_1, left_start_1[i], left_start_1[i + 1], X, load_four(X[own]));
     if (diagonal != UNIT) {
       const double *f = F + SQUARE * diagonal;
       y = (load_four(f) * y[0] + load_four(f + GAUSS) * y[1]) + (load_four(f + 2 * GAUSS) * y[2] + load_four(f + 3 * GAUSS) * y[3]);
@@ -6386,7 +6378,7 @@ static void mean_on_grid_1(const double *restrict F, const Matrices *restrict m,
   }
   for (i = 10; i >= 0; --i) {
     const int own = pivot_1[i];
-    const Four y = less_blocks_1(F, right_block_1, right_state_1, right_start_1[i], right_start_1[i + 1], X, load_four(X[own]));
+    const Four y = less_blocks(F, right_block_1, right_state_1, right_start_1[i], right_start_1[i + 1], X, load_four(X[own]));
     memcpy(X[own], &y, sizeof y);
     x[own] += (gauss_end[0] * y[0] + gauss_end[1] * y[1]) + (gauss_end[2] * y[2] + gauss_end[3] * y[3]);
   }
@@ -6476,14 +6468,6 @@ static int factorise_2(const Matrices *restrict m, const double *restrict h, Eig
   return 1;
 }
 
-/* x less the sum of F y over listed blocks */
-static inline Four less_blocks_2(const double *F, const int *block, const int *state, const int first, const int last, double (*X)[GAUSS], Four x) {
-  int l, s;
-  for (l = first; l < last; ++l)
-    for (s = 0; s < GAUSS; ++s) x -= load_four(F + SQUARE * block[l] + GAUSS * s) * X[state[l]][s];
-  return x;
-}
-
 /* One step forward with the mean x of the rows of kind 2; X is what it is at the stages */
 static void mean_on_grid_2(const double *restrict F, const Matrices *restrict m, const double h, const int lane, double *restrict x, double (*restrict X)[GAUSS]) {
   int i, s;
@@ -6493,7 +6477,7 @@ static void mean_on_grid_2(const double *restrict F, const Matrices *restrict m,
   }
   for (i = 0; i < 3; ++i) {
     const int own = pivot_2[i], diagonal = diagonal_2[i];
-    Four y = less_blocks_2(F, left_block_2, left_state_2, left_start_2[i], left_start_2[i + 1], X, load_four(X[own]));
+    Four y = less_blocks(F, left_block_2, left_state_2, left_start_2[i], left_start_2[i + 1], X, load_four(X[own]));
     if (diagonal != UNIT) {
       const double *f = F + SQUARE * diagonal;
       y = (load_four(f) * y[0] + load_four(f + GAUSS) * y[1]) + (load_four(f + 2 * GAUSS) * y[2] + load_four(f + 3 * GAUSS) * y[3]);
@@ -6502,7 +6486,7 @@ static void mean_on_grid_2(const double *restrict F, const Matrices *restrict m,
   }
   for (i = 2; i >= 0; --i) {
     const int own = pivot_2[i];
-    const Four y = less_blocks_2(F, right_block_2, right_state_2, right_start_2[i], right_start_2[i + 1], X, load_four(X[own]));
+    const Four y = less_blocks(F, right_block_2, right_state_2, right_start_2[i], right_start_2[i + 1], X, load_four(X[own]));
     memcpy(X[own], &y, sizeof y);
     x[own] += (gauss_end[0] * y[0] + gauss_end[1] * y[1]) + (gauss_end[2] * y[2] + gauss_end[3] * y[3]);
   }

@@ -23,8 +23,7 @@ LEAST_KNOTS = 4  # of a piece
 MET_ALTITUDE = "met_altitude"  # of the foremost gust zone; its rate is another table
 # of the tables of the mean response, s: after a start or a jump the mean rings as fast as networks and bending do, and
 # what the tables miss there no engine can see, because all read the same
-MEAN_SPACINGS = ((1.0, 0.004), (3.0, 0.008), (8.0, 0.0125))  # until so long after it
-MEAN_SPACING = 0.025  # later
+MEAN_SPACINGS = ((1.0, 0.004), (3.0, 0.008), (8.0, 0.0125), (float("inf"), 0.025))  # until so long after it
 
 
 def vehicle_tables(vehicle: Vehicle) -> tuple[TableGroup, ...]:
@@ -61,11 +60,6 @@ def mean_source(table: str) -> tuple[MeanKind, str]:
     raise UnknownNameError("table of the mean", table, MEAN_TABLES)
 
 
-def is_mean(table: str) -> bool:
-    """Tell whether a table is of the mean response."""
-    return any(table == name or table.endswith(f".{name}") for name in MEAN_TABLES)
-
-
 def met_altitude_name(vehicle: Vehicle) -> str:
     """Return the table whose value is the altitude of the wind that is met."""
     return "altitude" if vehicle.zones is None else MET_ALTITUDE
@@ -75,11 +69,11 @@ def mean_knots(start: float, end: float, discontinuities: Sequence[float]) -> np
     """Return the times (s) at which the mean response is tabulated, discontinuities among them."""
     pieces = []
     for low, high in pairwise([start, *discontinuities, end]):
-        spacings = [(low + until, spacing) for until, spacing in MEAN_SPACINGS if low + until < high]
-        last = MEAN_SPACINGS[len(spacings)][1] if len(spacings) < len(MEAN_SPACINGS) else MEAN_SPACING
         begin = low
-        for until, spacing in (*spacings, (high, last)):
-            count = max(LEAST_KNOTS, int(np.ceil((until - begin) / spacing - 1e-9)))
-            pieces.append(np.linspace(begin, until, count + 1)[:-1])
-            begin = until
+        for until, spacing in MEAN_SPACINGS:
+            end_of_piece = min(low + until, high)
+            if end_of_piece > begin:
+                count = max(LEAST_KNOTS, int(np.ceil((end_of_piece - begin) / spacing - 1e-9)))
+                pieces.append(np.linspace(begin, end_of_piece, count + 1)[:-1])
+                begin = end_of_piece
     return np.append(np.concatenate(pieces), end)

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import DirectNoiseError, NonlinearSystemError, SystemDefinitionError, TimeRangeError, UnknownNameError
-from ..tables import Table, TableGroup
+from ..tables import MeanKind, Table, TableGroup
 from .arrays import parts_from_arrays
 from .checks import (
     check_covariance,
@@ -348,6 +348,13 @@ class LinearSystem:
         if source not in self.sources:
             raise UnknownNameError("noise source", source, self.sources)
         return [i for i, n in enumerate(self.noises) if n.source == source]
+
+    @property
+    def mean_sources(self) -> dict[int, tuple[MeanKind, int]]:
+        """Of each table of the mean response, by the number of its value: whether an output or a state, and which."""
+        sources = [source for g in self.tables for source in (g.sources or (None,) * len(g.names))]
+        number = {"output": self.output_index, "state": self.state_names.index}
+        return {value: (of[0], number[of[0]](of[1])) for value, of in enumerate(sources) if of is not None}
 
     def output_index(self, name: str) -> int:
         """Return the row of a response in C and D.

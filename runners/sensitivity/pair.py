@@ -21,7 +21,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...codegen.sweep.gauss_legendre import STAGES
-from ...model.equations.vehicle_tables import is_mean, mean_source
 from ..solvers.collocation_grid import tables_at
 from ..solvers.flight_nodes import FlightNodes
 from ..solvers.start_functions import start_functions
@@ -174,21 +173,16 @@ class AdjointPair:
     def mean_path(self, on_tables: NDArray, on_tables_end: NDArray) -> MeanPath | None:
         """Give what the variance owes to the tables of the mean response to the mean's states and outputs."""
         system = self.executable.system
-        names = [name for g in self.executable.groups for name in g.names]
-        means = [name for name in names if is_mean(name)]
-        if not means:
+        if not system.mean_sources:
             return None
         k, n, r = self.times.size, len(system.states), len(system.outputs)
         path = MeanPath(np.zeros((k, n)), np.zeros((k, r)), np.zeros(n), np.zeros(r))
-        for name in means:
-            kind, what = mean_source(name)
-            along, last = on_tables[:, names.index(name)], on_tables_end[names.index(name)]
+        for value, (kind, of) in system.mean_sources.items():
+            along, last = on_tables[:, value], on_tables_end[value]
             if kind == "output":
-                row = system.output_index(what)
-                path.on_outputs[:, row] += along
-                path.on_outputs_at_end[row] += last
+                path.on_outputs[:, of] += along
+                path.on_outputs_at_end[of] += last
             else:
-                state = system.state_names.index(what)
-                path.on_states[:, state] += along
-                path.on_states_at_end[state] += last
+                path.on_states[:, of] += along
+                path.on_states_at_end[of] += last
         return path

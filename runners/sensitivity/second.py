@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 from ...codegen.nodes.expressions import MATRICES
 from ...codegen.nodes.matrix import NodeMatrix
 from ...codegen.sweep.gauss_legendre import STAGES
-from ...model.equations.vehicle_tables import is_mean, mean_source
 from ...model.errors import ParameterValueError, SwitchError
 from ..case.provenance import provenance
 from ..present.progress import each
@@ -189,13 +188,9 @@ def _column(pair: AdjointPair, combined: Combination, factors: tuple[float, floa
     dx, dx_end = stages.reshape(-1, n), edges[-1:]
     _, outputs = nodes.mean_tangents(d, x, dx)
     _, outputs_end = end.mean_tangents(d_end, x_end, dx_end)
-    names = [name for group in pair.executable.groups for name in group.names]
-    for name in names:
-        if is_mean(name):
-            kind, what = mean_source(name)
-            at = system.output_index(what) if kind == "output" else system.state_names.index(what)
-            d_tables[:, names.index(name)] = (outputs if kind == "output" else dx)[:, at]
-            d_end_tables[:, names.index(name)] = (outputs_end if kind == "output" else dx_end)[:, at]
+    for value, (kind, of) in system.mean_sources.items():
+        d_tables[:, value] = (outputs if kind == "output" else dx)[:, of]
+        d_end_tables[:, value] = (outputs_end if kind == "output" else dx_end)[:, of]
     d, d_end = nodes.matrix_tangents(numbers, d_tables), end.matrix_tangents(numbers, d_end_tables)
 
     # the adjoint, and its product with the covariance

@@ -117,12 +117,8 @@ def with_mean_tables(
         return executable
     group = executable.groups[at]
     mean = respond(executable, group.knots)
-    columns = []
-    for kind, what in group.sources:
-        if kind == "output":
-            columns.append(mean.outputs[:, system.output_index(what)])
-        else:
-            columns.append(mean.states[:, system.state_names.index(what)])
+    sources = system.mean_sources.values()
+    columns = [(mean.outputs if kind == "output" else mean.states)[:, of] for kind, of in sources]
     filled = mean_splines(group, np.stack(columns, axis=1), system.discontinuities)
     return executable.with_numbers(groups=(*executable.groups[:at], filled, *executable.groups[at + 1 :]))
 
