@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...model.deprecation import warn_deprecated
-from ...model.errors import UnknownNameError
+from ...model.errors import IntegrationError, UnknownNameError
 from ..present.notebook import html_of
 from ..present.progress import each, steps
 from ..solvers.adjoint import AdjointSolver
@@ -19,7 +19,7 @@ from ..statistics.larger_side import larger_side, side
 from ..statistics.peaks_of_resultants import laws_by_adjoint
 from ..statistics.resultants import labels_of, outputs_of
 from ..study import Study
-from .peaks import SIGNS
+from .peaks import SIGNS, three_sigma
 from .problem import DesignProblemError, LoadReliefProblem, family_words
 from .search import ACTIVE, Search, Stationarity
 
@@ -209,10 +209,11 @@ def recompute_peaks(result: DesignResult, relative_tolerance: float = 1e-11) -> 
     ------
     IntegrationError
     """
-    problem, search = result.problem, Search(result.problem)
+    problem, study = result.problem, result.study
     responses = [problem.response, *problem.peak_limits]
-    peaks = search.point(_position(problem, result.values)).peaks
-    study = result.study
+    peaks = three_sigma(study, responses, problem.times)
+    if peaks is None:
+        raise IntegrationError("the peaks of the design are beyond numbers; see its dampings and growth")
     options = CvodesSettings(relative_tolerance=relative_tolerance)
     solver = AdjointSolver(study.mean.fill(study.executable), options)
     largest = peaks.max(axis=1)

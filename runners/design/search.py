@@ -10,6 +10,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +18,11 @@ from scipy.optimize import lsq_linear, minimize
 
 from ..solvers.frozen_roots import FrozenDamping, FrozenRoots, root_families
 from ..statistics.resultants import labels_of
-from .peaks import SIGNS, Row, gradients, three_sigma
+from .peaks import SIGNS, Row, TrialPeaks, gradients
 from .problem import LoadReliefProblem
+
+if TYPE_CHECKING:
+    from ..study import Study
 
 log = logging.getLogger(__name__)
 
@@ -30,6 +34,7 @@ GROWTH_SCALE = 0.05  # 1/s
 TOO_FAST = 0.2  # 1/s: a flight that grows so is not integrated
 LEAST_DAMPING_SCALE = 0.01
 ITERATIONS, RESTARTS = 60, 3
+SETTLED = 1e-8  # of a peak: what a grid may miss otherwise at the result than where its error was taken
 
 
 class _FeasibleError(Exception):
@@ -75,28 +80,51 @@ class Search:
         self.roots = FrozenRoots(executable, problem.frozen_times, problem.names) if problem.frozen_times else None
         self.evaluations = self.derivatives = 0
         self._points: dict[bytes, Point] = {}
+        self._settled: dict[bytes, Point] = {}
         self._exact: dict[bytes, dict[Row, NDArray]] = {}
         self._last: dict[str, dict[Row, NDArray]] = {}
         sizes = [labels_of(problem.study, response)[0].scale for response in self.responses]
         self._fallback = np.array(sizes)[:, None, None] * np.ones((len(self.responses), len(SIGNS), len(problem.times)))
+        self._peaks = TrialPeaks(problem.study, self.responses, problem.times)
+        self.settle(problem.start)
         self.scale = self.height(problem.start)
 
     def point(self, u: NDArray[np.float64]) -> Point:
         """Return what a position gives; a flight too unstable to integrate gets peaks that grow with its roots."""
         key = u.tobytes()
+        if key in self._settled:
+            return self._settled[key]
         if key not in self._points:
-            study, growth = self.problem.study_at(u), 0.0
-            frozen = self.roots(study.executable.parameters) if self.roots else None
-            if frozen is not None:
-                growth = float(frozen.growth.max())
-            peaks = None if growth > TOO_FAST else three_sigma(study, self.responses, self.problem.times)
-            if peaks is None:
-                peaks = self._fallback * (2.0 + 10.0 * max(growth, 0.0))
-            else:
-                self._fallback = peaks
-            self.evaluations += 1
-            self._points[key] = Point(peaks, frozen)
+            self._points[key] = self._point(u, self._peaks)
         return self._points[key]
+
+    def settle(self, u: NDArray[np.float64]) -> float:
+        """Compute a position by controlled steps; return by what part of a peak all others move by that."""
+        moved = 0.0
+
+        def exact(study: Study) -> NDArray[np.float64] | None:
+            nonlocal moved
+            values, moved = self._peaks.settle(study)
+            return values
+
+        key = u.tobytes()
+        if key not in self._settled:
+            self._settled[key] = self._point(u, exact)
+            self._points.clear()
+        return moved
+
+    def _point(self, u: NDArray[np.float64], peaks_of: Callable[[Study], NDArray[np.float64] | None]) -> Point:
+        study, growth = self.problem.study_at(u), 0.0
+        frozen = self.roots(study.executable.parameters) if self.roots else None
+        if frozen is not None:
+            growth = float(frozen.growth.max())
+        peaks = None if growth > TOO_FAST else peaks_of(study)
+        if peaks is None:
+            peaks = self._fallback * (2.0 + 10.0 * max(growth, 0.0))
+        else:
+            self._fallback = peaks
+        self.evaluations += 1
+        return Point(peaks, frozen)
 
     def height(self, u: NDArray[np.float64]) -> float:
         """Return the peak of the response that is minimised, SI."""
@@ -206,6 +234,7 @@ class Search:
             (hard, gave), (hard_before, gave_before) = missed(best), missed(before)
             if hard >= hard_before and gave > 0.99 * gave_before:
                 break
+        self.settle(best)
         return best
 
     def descend(
@@ -226,10 +255,12 @@ class Search:
         def tell(z: NDArray[np.float64]) -> None:
             heard(np.clip(z[:-1], 0, 1))
 
-        for _ in range(RESTARTS):
+        for restart in range(RESTARTS):
+            if restart == RESTARTS - 1:
+                self._peaks.leave_grid()
             found = _slsqp(np.append(u, self.height(u) / self.scale), slack, slope, tell)
             u = np.clip(found[:-1], 0, 1)
-            if self.stationarity(u).residual <= ACTIVE:
+            if self.settle(u) <= SETTLED and self.stationarity(u).residual <= ACTIVE:
                 break
         return u
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -15,10 +14,10 @@ from numpy.typing import NDArray
 from ...codegen.sweep.compiled import sweep_of
 from ...codegen.system.executable import ExecutableSystem
 from ...model.errors import AscentwindError
+from ..case.shared_grid import shared_rule
 from ..solvers.adjoint import AdjointSolver
-from ..solvers.fixed_grid import StepRule
 from ..solvers.stability import first_unstable
-from ..solvers.sweep import MANY, rule_for, sweep_member
+from ..solvers.sweep import MANY, sweep_member
 from ..statistics.cvodes import Cvodes
 from ..statistics.norm import NormOfNormal
 from ..statistics.resultants import resultant_pairs
@@ -177,7 +176,7 @@ def _member_statistics(study: Study, task: Task) -> Callable[[ExecutableSystem],
 
         return by_cvodes
     compiled = sweep_of(study.executable)
-    rule = _rule(study, task) if task.members >= MANY else None
+    rule = shared_rule(study, task.times, task.relative_tolerance) if task.members >= MANY else None
 
     def by_sweep(member: ExecutableSystem) -> Numbers:
         found = sweep_member(
@@ -202,20 +201,6 @@ def _numbers(task: Task, mean: Array, variance: Array, moments: list[tuple[Array
     of_planes, between = (np.stack(parts, axis) for parts in zip(*moments, strict=True))
     level = NormOfNormal(of_planes, between.sum(axis=2)).percentile(task.probability)
     return {"mean": mean, "variance": variance, "plane_mean": of_planes, "plane_covariance": between, "level": level}
-
-
-def _rule(study: Study, task: Task) -> StepRule | None:
-    """Return the rule of the members' grids, chosen once on the nominal numbers: the same whoever computes a chunk."""
-    numbers, code = study.executable, sweep_of(study.executable).shared_library.key
-    digest = hashlib.sha256(repr((code, task.times, task.relative_tolerance, type(study.mean))).encode())
-    for array in (numbers.parameters, numbers.tables):
-        digest.update(np.ascontiguousarray(array).tobytes())
-
-    def choose() -> StepRule | None:
-        tolerance, fill = task.relative_tolerance, study.mean.fill
-        return rule_for(sweep_of(numbers), numbers, task.times, relative_tolerance=tolerance, fill=fill)
-
-    return numbers.libraries.held(f"steps of {digest.hexdigest()}", choose)
 
 
 def empty_result(study: Study, task: Task, members: int, reason: str = "") -> ChunkResult:

@@ -15,7 +15,7 @@ from ascentwind.model.errors import DeprecatedNameWarning, ParameterValueError, 
 from ascentwind.runners import Study
 from ascentwind.runners.design import design as designs
 from ascentwind.runners.design.design import InfeasibleDesignError, RecomputedPeak, design, recompute_peaks, trade
-from ascentwind.runners.design.peaks import gradients, three_sigma
+from ascentwind.runners.design.peaks import TrialPeaks, gradients, three_sigma
 from ascentwind.runners.design.problem import DesignProblemError, LoadReliefProblem
 from ascentwind.runners.solvers.frozen_roots import FrozenRoots
 
@@ -65,6 +65,42 @@ def test_optimum_on_a_limit_is_the_closed_form_one(lag):
     assert found.peak == pytest.approx(3 / np.sqrt(2 * k), rel=1e-7)
     assert found.converged
     assert [name for name, _ in found.stationarity.multipliers][-1] == "peak effort, 40 s"
+
+
+def test_a_grid_that_misses_much_does_not_move_the_optimum(lag, monkeypatch):
+    """What it misses is taken at the result, again and again, and the last pass does without."""
+
+    def off(trials: TrialPeaks, study: Study) -> np.ndarray | None:
+        found = None if trials._grid is None else trials.exact(study)
+        return None if found is None else found * (1 + 1e-3 * study.parameters["k"].value ** 2)
+
+    def pretended(trials: TrialPeaks, *arguments) -> None:
+        made(trials, *arguments)
+        trials._grid = trials._grid or ()  # type: ignore[assignment]  # no grid pays for one state
+
+    made = TrialPeaks.__init__
+    monkeypatch.setattr(TrialPeaks, "__init__", pretended)
+    monkeypatch.setattr(TrialPeaks, "_on_grid", off)
+    limit = 1.8
+    found = design(LoadReliefProblem(lag, {"k": (0.5, 3.0)}, LATE, response="load", peak_limits={"effort": limit}))
+    assert found.values["k"] == pytest.approx(2 * (limit / 3) ** 2, rel=1e-7)
+    assert found.converged
+
+
+def test_trials_on_the_grid_follow_controlled_steps(as504):
+    times, names = (50.0, 52.0, 54.0, 56.0), ["bending_moment", "engine_angle"]
+    trials = TrialPeaks(as504, names, times)
+    changed = as504.with_parameters({"control.T1.gain": 1.5, "control.T2.gain": 1.1})
+    found, exact = trials(changed), three_sigma(changed, names, times)
+    assert found is not None and exact is not None
+    assert 0 < np.abs(found / exact - 1).max() < 2e-6
+    settled, moved = trials.settle(changed)
+    assert settled is not None
+    np.testing.assert_array_equal(settled, exact)
+    assert 0 < moved < 2e-6
+    assert trials(changed) == pytest.approx(exact, rel=1e-13)
+    trials.leave_grid()
+    assert trials(as504) == pytest.approx(three_sigma(as504, names, times), rel=0, abs=0)
 
 
 def test_smooth_optimum_inside_the_bounds_is_the_closed_form_one(lag):
