@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from io import BytesIO
 from pathlib import Path
 from textwrap import wrap
 from typing import Any
 
+import numpy as np
 from matplotlib import figure as matplotlib_figure
 from matplotlib import rc_context
-from matplotlib.axis import Axis, Tick
+from matplotlib.artist import Artist
+from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.text import Text
@@ -17,9 +20,9 @@ from matplotlib.ticker import FixedFormatter, FuncFormatter
 
 from ...model.system.names import COMBINED, file_name
 from .files import write_whole
+from .png import png
 
 PIXELS = 150  # an inch, of PNG files
-PACKED = {"compress_level": 1}  # up to a tenth larger than by default, packed in a third of the time
 TITLE_WIDTH = 76  # characters across a figure of 8 inches
 STYLE: dict[Any, Any] = {
     "figure.figsize": (8.0, 5.0),
@@ -61,28 +64,61 @@ def _parts(line: str) -> list[str]:
 def write_figure(figure: matplotlib_figure.Figure, folder: Path, name: str) -> list[Path]:
     """Write a figure as PNG and SVG; a dollar sign in a title or name stays one.
 
-    By the canvases themselves: ``savefig`` draws every figure twice, once for its layout.
+    By the canvases themselves: ``savefig`` draws every figure twice, once for its layout. What is found for the first
+    file holds for both: the layout, where each legend has room, and how far labels of axes stand from them.
     """
     name = file_name(name)
     _take_dollars_as_written(figure)
     with rc_context(STYLE):
         figure.dpi = PIXELS
-        png = write_whole(folder / f"{name}.png", lambda p: FigureCanvasAgg(figure).print_png(p, pil_kwargs=PACKED))
-        figure.set_layout_engine("none")  # what it has found holds for both files
+        canvas = FigureCanvasAgg(figure)
+        engine = figure.get_layout_engine()
+        if engine is not None:
+            engine.execute(figure)
+            figure.set_layout_engine("none")
+        _keep_legends(figure)
+        canvas.draw()
+        image = png(np.asarray(canvas.buffer_rgba()), PIXELS)
+        drawn = write_whole(folder / f"{name}.png", lambda p: p.write_bytes(image))
+        _keep_labels(figure)
         svg = write_whole(
             folder / f"{name}.svg", lambda p: FigureCanvasSVG(figure).print_svg(str(p), metadata={"Date": None})
         )
-    return [png, svg]
+    return [drawn, svg]
+
+
+def _keep_legends(figure: matplotlib_figure.Figure) -> None:
+    """Keep legends where they are: one that looks for the best place does so at every question for its extent."""
+    for axes in figure.axes:
+        legend = axes.get_legend()
+        if legend is not None:
+            inside, place = legend.get_bbox_to_anchor(), legend.get_window_extent()
+            if inside.width > 0 and inside.height > 0:
+                legend.set_loc(((place.x0 - inside.x0) / inside.width, (place.y0 - inside.y0) / inside.height))
+
+
+def _keep_labels(figure: matplotlib_figure.Figure) -> None:
+    """Keep labels of axes where they were drawn, which else is found from the extents of all tick labels."""
+    for axes in figure.axes:
+        for axis in (axes.xaxis, axes.yaxis):
+            drawn = axis.label.get_transform().transform(axis.label.get_position())
+            axis.set_label_coords(*axes.transAxes.inverted().transform(drawn))
 
 
 def _take_dollars_as_written(figure: matplotlib_figure.Figure) -> None:
     """Keep titles and names from being read as mathematics, which only the powers of ten on axes are."""
-    axes = [axis for axis in figure.findobj(Axis) if isinstance(axis, Axis)]
-    numbers = set()  # tick labels, and what stands beside them
-    for axis in axes:
-        numbers.add(axis.offsetText)
-        if not isinstance(axis.get_major_formatter(), FixedFormatter | FuncFormatter):
-            numbers |= {label for tick in axis.findobj(Tick) for label in (tick.label1, tick.label2)}
-    for text in figure.findobj(Text):
-        if text not in numbers:
-            text.set_parse_math(False)
+    for text in _titles_and_names(figure):
+        text.set_parse_math(False)
+
+
+def _titles_and_names(artist: Artist) -> Iterator[Text]:
+    """Give all texts below an artist but numbers on axes, whose ticks need not be made for it."""
+    for child in artist.get_children():
+        if isinstance(child, Text):
+            yield child
+        elif not isinstance(child, Axis):
+            yield from _titles_and_names(child)
+        else:
+            yield child.label
+            if isinstance(child.get_major_formatter(), FixedFormatter | FuncFormatter):
+                yield from child.get_ticklabels()

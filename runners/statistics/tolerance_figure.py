@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from matplotlib import rc_context
-from matplotlib.ticker import NullFormatter
+from matplotlib.ticker import NullFormatter, NullLocator
 
 from ..present.style import STYLE, Figure
 from .tolerance import Measurement, Pace
@@ -28,6 +28,8 @@ def tolerance_figure(measurements: Sequence[Measurement], paces: Sequence[Pace],
         seconds.set(xlabel="relative tolerance", ylabel="run time (ms)")
         for axes in (error, seconds):
             axes.invert_xaxis()
+            axes.xaxis.set_minor_locator(NullLocator())
+        error.yaxis.set_minor_locator(NullLocator())  # of decades, and grid lines there
         seconds.yaxis.set_minor_formatter(NullFormatter())
         error.legend(fontsize=8.5)
         edges = [paces[0].begin, *(p.end for p in paces)]
