@@ -15,9 +15,9 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import CubicSpline, PchipInterpolator, PPoly
 
 from .errors import DataError
+from .polynomials import PiecewisePolynomial, monotone_cubics, not_a_knot_spline, straight_lines
 
 ORDER = 4  # coefficients of a cubic
 Kind = Literal["given", "mean"]  # of a group of tables
@@ -68,11 +68,11 @@ class Table:
             raise DataError(f"interpolation '{self.interpolation}' is not one of {', '.join(INTERPOLATIONS)}")
 
     @cached_property
-    def polynomial(self) -> PPoly:
+    def polynomial(self) -> PiecewisePolynomial:
         """The table as a piecewise cubic, extended to the breaks inside its range."""
         x, y = self.argument, self.values
         if self.interpolation == "step":
-            return PPoly(np.vstack([np.zeros((ORDER - 1, y.size)), y]), np.append(x, x[-1] + 1.0))
+            return PiecewisePolynomial(np.vstack([np.zeros((ORDER - 1, y.size)), y]), np.append(x, x[-1] + 1.0))
         inner = [b for b in sorted(set(self.breaks)) if x[0] < b < x[-1]]
         edges = [x[0], *inner, x[-1]]
         knots, coefficients = [], []
@@ -84,14 +84,14 @@ class Table:
             points = np.unique(np.concatenate([[low], piece.x[(piece.x > low) & (piece.x < high)]]))
             knots.append(points)
             coefficients.append(taylor_coefficients(piece, points, points))
-        return PPoly(np.concatenate(coefficients, axis=1), np.append(np.concatenate(knots), x[-1]))
+        return PiecewisePolynomial(np.concatenate(coefficients, axis=1), np.append(np.concatenate(knots), x[-1]))
 
-    def _piece(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> PPoly:
+    def _piece(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> PiecewisePolynomial:
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             try:
                 piece = _interpolate(x, y, self.interpolation)
                 finite = np.isfinite(piece.c).all()
-            except (ValueError, np.linalg.LinAlgError):  # SciPy's own refusal of what overflows on its way
+            except ZeroDivisionError:  # of what underflows on its way
                 piece, finite = None, False
         if piece is None or not finite:
             raise DataError(
@@ -101,22 +101,19 @@ class Table:
         return piece
 
 
-def _interpolate(x: NDArray, y: NDArray, interpolation: str) -> PPoly:
+def _interpolate(x: NDArray, y: NDArray, interpolation: str) -> PiecewisePolynomial:
     if interpolation == "linear" or x.size == 2:
-        slope = np.diff(y) / np.diff(x)
-        return PPoly(np.vstack([np.zeros((2, slope.size)), slope, y[:-1]]), x)
-    if interpolation == "pchip":
-        return PchipInterpolator(x, y)
-    return CubicSpline(x, y, bc_type="not-a-knot")
+        return straight_lines(x, y)
+    return monotone_cubics(x, y) if interpolation == "pchip" else not_a_knot_spline(x, y)
 
 
-def taylor_coefficients(polynomial: PPoly, points: ArrayLike, inside: ArrayLike) -> NDArray:
+def taylor_coefficients(polynomial: PiecewisePolynomial, points: ArrayLike, inside: ArrayLike) -> NDArray:
     """Expand a piecewise polynomial about ``points``, using the piece that holds ``inside``.
 
     Returns
     -------
     (4, n) array
-        Highest power first, as SciPy's PPoly orders them.
+        Highest power first, as piecewise polynomials have them.
     """
     points, inside = np.asarray(points, float), np.asarray(inside, float)
     piece = np.clip(np.searchsorted(polynomial.x, inside, side="right") - 1, 0, polynomial.c.shape[1] - 1)
@@ -165,7 +162,7 @@ class TableGroup:
 
     @staticmethod
     def from_polynomials(
-        name: str, argument: str, polynomials: Sequence[tuple[str, str, PPoly]], start: float, end: float
+        name: str, argument: str, polynomials: Sequence[tuple[str, str, PiecewisePolynomial]], start: float, end: float
     ) -> TableGroup:
         """Merge (name, unit, polynomial) onto the union of the knots between ``start`` and ``end``.
 
@@ -184,7 +181,7 @@ class TableGroup:
             np.stack([_column(p, knots) for _, _, p in polynomials], axis=2),
         )
 
-    def with_polynomials(self, polynomials: Mapping[str, PPoly]) -> TableGroup:
+    def with_polynomials(self, polynomials: Mapping[str, PiecewisePolynomial]) -> TableGroup:
         """Return the group with some of its tables replaced on its own knots, which hold theirs; others pass over."""
         coefficients = self.coefficients.copy()
         for name in polynomials.keys() & set(self.names):
@@ -232,7 +229,7 @@ def run_time_vector(groups: Sequence[TableGroup]) -> NDArray[np.float64]:
     return np.concatenate([np.zeros(0), *(g.run_time_vector() for g in groups)])
 
 
-def _column(polynomial: PPoly, knots: NDArray[np.float64]) -> NDArray[np.float64]:
+def _column(polynomial: PiecewisePolynomial, knots: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return a polynomial's coefficients on knots that hold its own, (k - 1, 4), held beyond its ends."""
     middle = 0.5 * (knots[:-1] + knots[1:])
     column = taylor_coefficients(polynomial, knots[:-1], middle)[::-1].T

@@ -149,7 +149,7 @@ def tanks_forward(
 def passes(table: Table, station: float, start: float, end: float) -> tuple[int, list[float]]:
     """Return whether a table lies above a station (m) at the start, 0 or 1, and the times (s) at which it passes it."""
     polynomial = table.polynomial
-    roots = polynomial.solve(station, extrapolate=False)
+    roots = polynomial.passes(station)
     times = np.unique(np.concatenate([[start, end], roots[(roots > start) & (roots < end)], polynomial.x]))
     times = times[(times >= start) & (times <= end)]
     above = polynomial((times[:-1] + times[1:]) / 2) > station

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
-from scipy.linalg import solve_continuous_lyapunov
+import scipy
 
 from ..system.symbols import ParameterSymbols, TableSymbols
 from ..wind.turbulence import INTENSITY, Turbulence, realisation
@@ -84,7 +84,7 @@ def start_covariance(turbulence: Turbulence, numbers: TurbulenceNumbers) -> ca.S
 def stationary(form: str) -> np.ndarray:
     """Return the stationary covariance of a form's states, (n, n): the same for any length."""
     A, B, _ = realisation(form)
-    P = np.asarray(solve_continuous_lyapunov(A, -B @ B.T))
+    P = np.asarray(scipy.linalg.solve_continuous_lyapunov(A, -B @ B.T))
     return 0.5 * (P + P.T)
 
 

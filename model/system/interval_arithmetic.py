@@ -11,8 +11,8 @@ from collections.abc import Callable
 
 import casadi as ca
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import erf
 
 Bounds = tuple[NDArray[np.float64], NDArray[np.float64]]  # low, high
 TRUE_OR_FALSE = (0.0, 1.0)
@@ -245,7 +245,7 @@ _RULES: dict[int, Callable[..., Bounds]] = {
     ca.OP_ASINH: _increasing(np.arcsinh),
     ca.OP_ACOSH: _increasing(np.arccosh, 1.0),
     ca.OP_ATANH: _increasing(np.arctanh, -1.0, 1.0),
-    ca.OP_ERF: _increasing(erf),
+    ca.OP_ERF: _increasing(lambda x: scipy.special.erf(x)),
     ca.OP_HYPOT: _hypotenuse,
     ca.OP_FABS: _absolute,
     ca.OP_SIGN: _increasing(np.sign),

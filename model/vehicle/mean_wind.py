@@ -11,8 +11,8 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.integrate import solve_ivp
 
 from ..errors import DataError
 from ..tables import Table
@@ -149,7 +149,7 @@ def with_biased_programme(vehicle: Vehicle) -> Vehicle:
         inside = (rows >= low) & (rows <= high)
         times = np.clip(rows[inside], low + SIDE, high - SIDE)  # a table that jumps at an edge is on this side of it
         before = float(drift[np.flatnonzero(inside)[-1]])
-        found = solve_ivp(
+        found = scipy.integrate.solve_ivp(
             upright, (high - SIDE, low + SIDE), [before], t_eval=times[::-1], rtol=_TOLERANCE, atol=_TOLERANCE,
             max_step=1.0,
         )  # fmt: skip

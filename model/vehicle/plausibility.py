@@ -17,10 +17,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from ambiance import Atmosphere
 from numpy.typing import NDArray
 
 from ..errors import DataError, PlausibilityWarning
+from ..standard_atmosphere import EARTH_RADIUS, GRAVITY, HIGHEST, LOWEST, standard_air
 from ..tables import Table
 from .biases import vehicle_biases
 from .columns import OWN_ANGLE
@@ -30,8 +30,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-GRAVITY, EARTH_RADIUS = 9.80665, 6_356_766.0  # m/s2, m: of the 1976 standard atmosphere
-TOP, BOTTOM = 81_000.0, -5_000.0  # m, of its tables
 FELT = 0.1  # of the largest dynamic pressure: below, ratios to it are of no consequence
 SHORTEST = 0.01  # s, between rows whose difference is taken as a rate
 SLOSH_ROOT = 1.841  # omega^2 R / a of the first lateral mode in a deep circular tank
@@ -214,7 +212,7 @@ class _Compared:
     def air(self) -> Iterator[Contradiction]:
         """q = rho V^2 / 2 with the density of the 1976 standard atmosphere."""
         height, speed = self.at("altitude"), self.at("relative_velocity")
-        density = Atmosphere(np.clip(height, BOTTOM, TOP)).density
+        density, _ = standard_air(np.clip(height, LOWEST, HIGHEST))
         yield from self.beyond(
             "trajectory", "dynamic_pressure", 2 * self.q / speed**2 / density, (0.75, 1.3), (0.5, 2.0),
             "is {q:.4g} Pa, but half the density times the speed squared is {there:.4g} Pa ({speed:.4g} m/s, "

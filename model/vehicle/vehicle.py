@@ -7,8 +7,8 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from scipy.interpolate import PPoly
 
+from ..polynomials import PiecewisePolynomial
 from ..tables import Table, taylor_coefficients
 from ..wind.statistics import WindModel
 from ..wind.turbulence import Turbulence
@@ -91,7 +91,7 @@ class Vehicle:
         return float(self.met_altitude(self.start))
 
     @cached_property
-    def met_altitude(self) -> PPoly:
+    def met_altitude(self) -> PiecewisePolynomial:
         """Altitude (m) over time at which the vehicle meets the wind: of its foremost gust zone, or its own."""
         altitude = self.tables["altitude"].polynomial
         return altitude if self.zones is None else _sum(altitude, self.tables[AHEAD].polynomial)
@@ -114,10 +114,10 @@ class Vehicle:
         return {"T1": self.file.control.T1, "T2": self.file.control.T2, "T3": self.file.control.T3}
 
 
-def _sum(first: PPoly, second: PPoly) -> PPoly:
+def _sum(first: PiecewisePolynomial, second: PiecewisePolynomial) -> PiecewisePolynomial:
     """Return the sum of two piecewise cubics where both are known."""
     low, high = max(first.x[0], second.x[0]), min(first.x[-1], second.x[-1])
     knots = np.unique(np.concatenate([[low, high], first.x, second.x]))
     knots = knots[(knots >= low) & (knots <= high)]
     middle = 0.5 * (knots[:-1] + knots[1:])
-    return PPoly(sum(taylor_coefficients(p, knots[:-1], middle) for p in (first, second)), knots)
+    return PiecewisePolynomial(sum(taylor_coefficients(p, knots[:-1], middle) for p in (first, second)), knots)

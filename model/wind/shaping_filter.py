@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import gamma, kv
 
 from ..errors import DataError
 from ..tables import Table, TableGroup
@@ -152,7 +152,11 @@ def matern(distance: ArrayLike, smoothness: float) -> NDArray[np.float64]:
     if smoothness == 0.5:
         return np.exp(-d)
     x = np.clip(np.sqrt(2 * smoothness) * d, 1e-12, 600.0)
-    return np.where(d > 0, 2 ** (1 - smoothness) / gamma(smoothness) * x**smoothness * kv(smoothness, x), 1.0)
+    return np.where(
+        d > 0,
+        2 ** (1 - smoothness) / scipy.special.gamma(smoothness) * x**smoothness * scipy.special.kv(smoothness, x),
+        1.0,
+    )
 
 
 @dataclass(frozen=True)

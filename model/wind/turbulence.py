@@ -15,8 +15,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import block_diag, solve_continuous_lyapunov
 
 from ..errors import DataError, UnknownNameError
 from ..tables import Table
@@ -162,7 +162,7 @@ def turbulence_filter(
         if high_pass is not None:
             corner = 2 * np.pi / high_pass
             F[k, m, :m], F[k, m, m], H[k, m] = corner * C, -corner, -sigma[k]
-    start = np.asarray(solve_continuous_lyapunov(F[0], -G[0] @ G[0].T))
+    start = np.asarray(scipy.linalg.solve_continuous_lyapunov(F[0], -G[0] @ G[0].T))
     return ShapingFilter(
         f"turbulence_{form.replace('-', '_')}",
         h,
@@ -185,7 +185,7 @@ def realisation(form: str) -> tuple[NDArray, NDArray, NDArray]:
     B, C = np.zeros((n, 1)), np.zeros(n)
     B[-1] = 1.0
     C[: numerator.size] = numerator[::-1]
-    P = solve_continuous_lyapunov(A, -B @ B.T)
+    P = scipy.linalg.solve_continuous_lyapunov(A, -B @ B.T)
     size = np.sqrt(np.diag(P))
     A, B, C = A * size / size[:, None], B / size[:, None], C * size
     return A, B, C / float(-C @ np.linalg.solve(A, B[:, 0]))
@@ -230,8 +230,8 @@ def add_filters(
     )
     h = h[np.concatenate([[True], np.diff(h) > 1e-6])]
     values = [[f.at(x) for x in h] for f in (first, second)]
-    F = np.array([block_diag(a[0], b[0]) for a, b in zip(*values, strict=True)])
-    G = np.array([block_diag(a[1], b[1]) for a, b in zip(*values, strict=True)])
+    F = np.array([scipy.linalg.block_diag(a[0], b[0]) for a, b in zip(*values, strict=True)])
+    G = np.array([scipy.linalg.block_diag(a[1], b[1]) for a, b in zip(*values, strict=True)])
     if correlation is not None:
         r = correlation.polynomial(np.clip(h, correlation.argument[0], correlation.argument[-1]))
         if (np.abs(r) > 1).any():
@@ -240,7 +240,7 @@ def add_filters(
         G[:, first.order :, 0] = r[:, None] * own
         G[:, first.order :, first.noise_count] = np.sqrt(1 - r**2)[:, None] * own
     H = np.array([np.concatenate([a[2], b[2]]) for a, b in zip(*values, strict=True)])
-    start = np.asarray(block_diag(first.start_covariance, second.start_covariance))
+    start = np.asarray(scipy.linalg.block_diag(first.start_covariance, second.start_covariance))
     cross = start_cross_covariance(first, second, start_correlation)
     start[: first.order, first.order :], start[first.order :, : first.order] = cross, cross.T
     kinks = tuple(sorted({x for f in (first, second) for x in f.kinks if low < x < high}))

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import PPoly
 
 from ...model.errors import DataError
+from ...model.polynomials import PiecewisePolynomial
 from .case import Case
 
 SAMPLES = 0.05  # s
@@ -21,13 +21,13 @@ class Climb:
 
     Attributes
     ----------
-    polynomial : PPoly
+    polynomial : PiecewisePolynomial
         Altitude (m) over flight time (s).
     times, altitudes : (k,) arrays
         Samples from the start to the end of the flight, s and m, increasing.
     """
 
-    polynomial: PPoly
+    polynomial: PiecewisePolynomial
     times: NDArray[np.float64]
     altitudes: NDArray[np.float64]
 

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from itertools import islice, pairwise
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import matrix_balance
 
 from ...codegen.ensemble.simulation import Steps
 from ...codegen.system.evaluation import MatrixEvaluator
@@ -199,7 +199,7 @@ def _balanced_scales(executable: ExecutableSystem) -> NDArray[np.float64]:
     (A,) = MatrixEvaluator(executable, ("A",))(0.5 * (first.begin + first.end), first.low, first.high)
     if not np.isfinite(A).all():
         raise IntegrationError(NOT_FINITE)
-    _, (balance, _) = matrix_balance(A * scale / scale[:, None], permute=False, separate=True)
+    _, (balance, _) = scipy.linalg.matrix_balance(A * scale / scale[:, None], permute=False, separate=True)
     return scale * balance
 
 

@@ -8,8 +8,8 @@ from itertools import pairwise
 
 import casadi as ca
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from ...codegen.system.executable import ExecutableSystem
 from ...codegen.system.functions import state_scales
@@ -127,5 +127,8 @@ def mean_splines(group: TableGroup, values: NDArray[np.float64], discontinuities
     """Return the group with values at its knots, interpolated between discontinuities, where the mean has corners."""
     knots = group.knots
     edges = [0, *(int(np.argmin(np.abs(knots - d))) for d in discontinuities), knots.size - 1]
-    pieces = [np.moveaxis(CubicSpline(knots[a : b + 1], values[a : b + 1]).c[::-1], 0, 1) for a, b in pairwise(edges)]
+    pieces = [
+        np.moveaxis(scipy.interpolate.CubicSpline(knots[a : b + 1], values[a : b + 1]).c[::-1], 0, 1)
+        for a, b in pairwise(edges)
+    ]
     return replace(group, coefficients=np.concatenate(pieces))

@@ -10,8 +10,8 @@ from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.integrate import solve_ivp
 
 from ...codegen.sweep.compiled import sweep_of
 from ...codegen.sweep.integrator import CompiledSweep
@@ -443,7 +443,7 @@ def interpreted_weighting(executable: ExecutableSystem, times: ArrayLike, spacin
             return ((matrix * scale / scale[:, None]) @ y.reshape(n, n)).ravel()
 
         budgeted = at_most(rate, MOST_STEPS, "t = {:.6g} s")
-        found = solve_ivp(budgeted, (begin, end), np.eye(n).ravel(), "DOP853", rtol=1e-9, atol=1e-12)
+        found = scipy.integrate.solve_ivp(budgeted, (begin, end), np.eye(n).ravel(), "DOP853", rtol=1e-9, atol=1e-12)
         if not found.success:
             raise IntegrationError(f"the transition from {begin:g} s to {end:g} s: {found.message}")
         transitions.append(found.y[:, -1].reshape(n, n) * scale[:, None] / scale)

@@ -19,8 +19,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import ndtr, ndtri_exp
 
 from ...model.errors import ParameterValueError
 
@@ -288,11 +288,13 @@ class _Circle:
         n = self.angle.shape[-1]
         x, y = self.x[..., : 2 * n], self.y[..., : 2 * n]
         (a1, a2), (s1, s2) = (np.moveaxis(v[..., None], -2, 0) for v in (self.a, self.s))
-        beside = ndtr((a2 - y) / s2) + ndtr((-a2 - y) / s2)
+        beside = scipy.special.ndtr((a2 - y) / s2) + scipy.special.ndtr((-a2 - y) / s2)
         step = np.concatenate([self.step, self.step], axis=-1) * y  # |dx| = R sin d(angle)
         inside = (_density((x - a1) / s1) / s1 * beside * step).sum(axis=-1)
         level = self.level
-        outside = ndtr((a1[..., 0] - level) / s1[..., 0]) + ndtr((-a1[..., 0] - level) / s1[..., 0])
+        outside = scipy.special.ndtr((a1[..., 0] - level) / s1[..., 0]) + scipy.special.ndtr(
+            (-a1[..., 0] - level) / s1[..., 0]
+        )
         return np.minimum(outside + inside, 1.0)
 
     def mean_of(self, values: Array) -> Array:
@@ -336,7 +338,7 @@ def _solved(target: float, a: Array, s: Array) -> Array:
     length, rare = np.sqrt((a**2).sum(axis=-1)), target < np.log(0.5)
     low = np.zeros(length.size)
     high = length + s[:, 0] * (np.sqrt(-2.0 * target) + 1.0)  # P(|M| > |a| + k s1) <= exp(-k^2 / 2), Rayleigh's law
-    k = float(-ndtri_exp(target)) if rare else 1.0
+    k = float(-scipy.special.ndtri_exp(target)) if rare else 1.0
     level = np.clip(np.sqrt(length**2 + 2.0 * k * np.abs(a * s).sum(axis=-1) + (k * s[:, 0]) ** 2), low, high)
     left = np.arange(length.size)
     for _ in range(_MOST_ROUNDS):

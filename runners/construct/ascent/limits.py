@@ -7,9 +7,9 @@ import warnings
 from collections.abc import Iterable, Mapping
 
 from ....model.construction import Construction
-from ....model.construction.atmosphere import TOP
 from ....model.construction.flight import EngineGroup
 from ....model.errors import DataError, ExtrapolationWarning
+from ....model.standard_atmosphere import HIGHEST
 from .integration import Ascent, Leg
 
 log = logging.getLogger(__name__)
@@ -100,10 +100,10 @@ def check_leg(ascent: Ascent, leg: Leg) -> None:
             "the pitch programme and the thrust",
             time=time,
         )
-    time = ascent.locate(leg, lambda o: o["altitude"] - TOP)
+    time = ascent.locate(leg, lambda o: o["altitude"] - HIGHEST)
     if time is not None:
         raise DataError(
-            f"the flight passes {TOP:g} m, where the standard atmosphere ends; give an earlier end_time", time=time
+            f"the flight passes {HIGHEST:g} m, where the standard atmosphere ends; give an earlier end_time", time=time
         )
     _check_mach(ascent, leg)
 
