@@ -89,10 +89,15 @@ def _compare_whole(vehicle: Vehicle, load: str, name: str, along: StationLoads) 
 
 def _compare_modes(vehicle: Vehicle, name: str, along: StationLoads) -> None:
     """Hold displacements of modes against the inertia in shear over a tenth of the vehicle around the place."""
-    time = _common(vehicle, along.tables["first_moment"][0].argument)
+    rows = along.tables["first_moment"][0].argument
+    time = _common(vehicle, rows)
     if not time.size:
         return
-    place, columns = along.forward_of_gimbal, along.at(time)
+    place, common = along.forward_of_gimbal, np.isin(rows, time)
+    inertias = [f"bending_{i}" for i in range(1, len(vehicle.bending) + 1)]
+    columns = {
+        name: np.array([table.values[common] for table in along.tables[name]]).T for name in ("first_moment", *inertias)
+    }
     reach = NEAR * (place[-1] - place[0])
     points = {"gimbal": np.zeros_like(time)}
     points |= {tank.name: _at(vehicle, f"slosh.{tank.name}.attach_point", time) for tank in vehicle.slosh}
@@ -105,8 +110,8 @@ def _compare_modes(vehicle: Vehicle, name: str, along: StationLoads) -> None:
         )
         return near - far
 
-    for i in range(1, len(vehicle.bending) + 1):
-        file, inertia = vehicle.folder / vehicle.file.bending[i - 1].table.file, f"bending_{i}"
+    for i, inertia in enumerate(inertias, start=1):
+        file = vehicle.folder / vehicle.file.bending[i - 1].table.file
         stated = {point: _at(vehicle, f"bending.{i}.displacement_at_{point}", time) for point in points}
         largest = float(np.max(np.abs(list(stated.values()))))
         for point, at in points.items():

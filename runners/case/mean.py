@@ -9,7 +9,6 @@ from typing import Protocol
 from ...codegen.system.executable import ExecutableSystem
 from ...model.vehicle.vehicle import Vehicle
 from ..solvers.mean_response import Respond, mean_response, with_mean_tables
-from ..solvers.planar_mean import with_nonlinear_mean
 
 ONE_AT_A_TIME = Lock()  # CVODES catches what CasADi writes, for the whole process
 
@@ -43,6 +42,8 @@ class NonlinearMean:
         ------
         DataError, IntegrationError
         """
+        from ..solvers.planar_mean import with_nonlinear_mean  # brings the equations of a flight with it
+
         filled = with_mean_tables(executable, respond)
         with ONE_AT_A_TIME:
             return with_nonlinear_mean(self.vehicle, filled)
