@@ -10,10 +10,9 @@ from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
-import scipy
 
 from ..system.symbols import ParameterSymbols, TableSymbols
-from ..wind.turbulence import INTENSITY, Turbulence, realisation
+from ..wind.turbulence import INTENSITY, Turbulence, realisation, stationary_covariance
 from .wind import WindBlock
 
 
@@ -84,8 +83,7 @@ def start_covariance(turbulence: Turbulence, numbers: TurbulenceNumbers) -> ca.S
 def stationary(form: str) -> np.ndarray:
     """Return the stationary covariance of a form's states, (n, n): the same for any length."""
     A, B, _ = realisation(form)
-    P = np.asarray(scipy.linalg.solve_continuous_lyapunov(A, -B @ B.T))
-    return 0.5 * (P + P.T)
+    return stationary_covariance(A, B)
 
 
 def _corner(numbers: TurbulenceNumbers) -> ca.SX:

@@ -128,7 +128,7 @@ def with_biased_programme(vehicle: Vehicle) -> Vehicle:
     def held(time: ArrayLike) -> dict[str, Array]:
         at = {name: table.polynomial(time) for name, table in given.items()}
         force = at["dynamic_pressure"] * area
-        own, zero = at.get(OWN_ANGLE["pitch"].name, 0.0), at.get(ZERO_ANGLE.name, 0.0)
+        own, zero = (at.get(column.name, np.zeros_like(force)) for column in (OWN_ANGLE["pitch"], ZERO_ANGLE))
         return {
             "wind": _across(vehicle, time), "speed": at["relative_velocity"], "mass": at["mass"], "own": own,
             "slope": force * at["normal_force_slope"], "zero": force * zero, "push": at["thrust"] - at["axial_drag"],

@@ -120,4 +120,5 @@ def _sum(first: PiecewisePolynomial, second: PiecewisePolynomial) -> PiecewisePo
     knots = np.unique(np.concatenate([[low, high], first.x, second.x]))
     knots = knots[(knots >= low) & (knots <= high)]
     middle = 0.5 * (knots[:-1] + knots[1:])
-    return PiecewisePolynomial(sum(taylor_coefficients(p, knots[:-1], middle) for p in (first, second)), knots)
+    ours, theirs = (taylor_coefficients(p, knots[:-1], middle) for p in (first, second))
+    return PiecewisePolynomial(ours + theirs, knots)

@@ -162,17 +162,24 @@ def turbulence_filter(
         if high_pass is not None:
             corner = 2 * np.pi / high_pass
             F[k, m, :m], F[k, m, m], H[k, m] = corner * C, -corner, -sigma[k]
-    start = np.asarray(scipy.linalg.solve_continuous_lyapunov(F[0], -G[0] @ G[0].T))
+    start = stationary_covariance(F[0], G[0])
     return ShapingFilter(
         f"turbulence_{form.replace('-', '_')}",
         h,
         F,
         G,
         H,
-        0.5 * (start + start.T),
+        start,
         tuple(float(c) for c in corners),
         f"{form} turbulence, {severity if intensity is None else 'given intensity'}",
     )
+
+
+def stationary_covariance(A: NDArray[np.float64], B: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the covariance P of few states z' = A z + B n that have run forever, (n, n): A P + P A' + B B' = 0."""
+    one = np.eye(A.shape[0])
+    P = np.linalg.solve(np.kron(A, one) + np.kron(one, A), -(B @ B.T).ravel()).reshape(A.shape)
+    return 0.5 * (P + P.T)
 
 
 def realisation(form: str) -> tuple[NDArray, NDArray, NDArray]:
@@ -185,8 +192,7 @@ def realisation(form: str) -> tuple[NDArray, NDArray, NDArray]:
     B, C = np.zeros((n, 1)), np.zeros(n)
     B[-1] = 1.0
     C[: numerator.size] = numerator[::-1]
-    P = scipy.linalg.solve_continuous_lyapunov(A, -B @ B.T)
-    size = np.sqrt(np.diag(P))
+    size = np.sqrt(np.diag(stationary_covariance(A, B)))
     A, B, C = A * size / size[:, None], B / size[:, None], C * size
     return A, B, C / float(-C @ np.linalg.solve(A, B[:, 0]))
 

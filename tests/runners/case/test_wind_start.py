@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from ascentwind.model.wind.shaping_filter import ShapingFilter
 from ascentwind.runners.case.wind_start import covariance_at
@@ -31,3 +34,22 @@ def test_filter_from_a_known_start_has_its_closed_form():
         expected = level + (4.0 - level) * np.exp(-2 * altitude / length)
         assert covariance_at(shaping_filter, altitude)[0, 0] == pytest.approx(expected, rel=1e-9)
     assert covariance_at(shaping_filter, -50.0)[0, 0] == 4.0
+
+
+def test_start_is_that_of_the_differential_equation(as504):
+    """By SciPy's DOP853 from sample to sample, where the coefficients have no corners."""
+    shaping_filter, n = as504.vehicle.wind.shaping_filter, as504.vehicle.wind.shaping_filter.order
+    samples = shaping_filter.altitude
+
+    def rate(h, p):
+        F, G, _ = shaping_filter.at(h)
+        P = p.reshape(n, n)
+        return (F @ P + P @ F.T + G @ G.T).ravel()
+
+    for altitude in (as504.vehicle.start_altitude, 2345.6):
+        P = shaping_filter.start_covariance.ravel()
+        for span in pairwise([*samples[samples < altitude], altitude]):
+            P = solve_ivp(rate, span, P, method="DOP853", rtol=1e-13, atol=1e-16).y[:, -1]
+        deviation = np.sqrt(np.diag(P.reshape(n, n)))
+        off = covariance_at(shaping_filter, altitude) - P.reshape(n, n)
+        assert np.abs(off / np.outer(deviation, deviation)).max() < 1e-13
