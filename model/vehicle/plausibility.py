@@ -308,8 +308,9 @@ class _Compared:
             part=part, thrust=thrust,
         )  # fmt: skip
         share = part / np.maximum(thrust, 1e-300)
-        phase = np.searchsorted(self.vehicle.tables["thrust"].breaks, self.time, side="right")
-        usual = np.array([np.median(share[phase == k]) for k in phase])
+        which = np.searchsorted(self.vehicle.tables["thrust"].breaks, self.time, side="right")
+        phases, phase = np.unique(which, return_inverse=True)
+        usual = np.array([np.median(share[which == k]) for k in phases])[phase]
         yield from self.beyond(
             "propulsion", "control_thrust", share / np.maximum(usual, 1e-300), (0.97, 1.03), (-np.inf, np.inf),
             "is {x:.4g} times its usual share {usual:.4g} of the thrust, {thrust:.4g} N, though no event lies between: "
