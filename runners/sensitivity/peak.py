@@ -5,6 +5,7 @@ At the peak the derivative of the maximum is the derivative at that time held fi
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 
 SCAN_POINTS = 40
 TIME_TOLERANCE = 1e-6  # of the time between two points of the scan
+SECANTS = 8  # four where a quantity is smooth
 
 
 def peak_time(case: Case, request: Request) -> tuple[float, bool]:
@@ -39,7 +41,8 @@ def peak_time(case: Case, request: Request) -> tuple[float, bool]:
     times = searched_times(case)
     scan = response_statistics(case, times, responses=[request.response])
     mean, variance = (scan[name].sel(source=request.source).values[:, 0] for name in ("mean", "variance"))
-    best = int(np.argmax([request.sought(float(v), float(m)) for v, m in zip(variance, mean, strict=True)]))
+    values = [request.sought(float(v), float(m)) for v, m in zip(variance, mean, strict=True)]
+    best = int(np.argmax(values))
     low, high = times[max(best - 1, 0)], times[min(best + 1, len(times) - 1)]
 
     @lru_cache
@@ -51,8 +54,12 @@ def peak_time(case: Case, request: Request) -> tuple[float, bool]:
         variance, mean = pair.slopes
         return request.sought(pair.variance, pair.mean), on_variance * variance + on_mean * mean
 
-    candidates = [times[best]]
     switches = case.executable.stops(high).times.tolist()
+    if low < times[best] < high and not any(low <= d <= high for d in switches):
+        found = _from_parabola(quantity, times[best - 1 : best + 2], values[best - 1 : best + 2])
+        if found is not None:
+            return found, False
+    candidates = [times[best]]
     edges = [low, *(d for d in switches if low < d < high), high]
     for a, b in pairwise(edges):
         if a in switches:  # the value may jump up there
@@ -66,6 +73,32 @@ def peak_time(case: Case, request: Request) -> tuple[float, bool]:
             )
     found = max(candidates, key=lambda t: quantity(t)[0])
     return found, found in (times[0], times[-1])
+
+
+def _from_parabola(
+    quantity: Callable[[float], tuple[float, float]], times: Sequence[float], values: Sequence[float]
+) -> float | None:
+    """Return where the slope of a quantity vanishes, by secants from the parabola through three values about its peak.
+
+    None where that is no maximum, leaves the interval, or is below the value in the middle.
+    """
+    (a, middle, b), (first, second, third) = times, values
+    before, after = (second - first) / (middle - a), (third - second) / (b - middle)
+    curvature = 2 * (after - before) / (b - a)
+    time = 0.5 * (a + middle - 2 * before / curvature) if curvature < 0 else middle
+    value, slope = quantity(time)
+    for _ in range(SECANTS):
+        if not curvature < 0:
+            return None
+        new = time - slope / curvature
+        if not a < new < b:
+            return None
+        if abs(new - time) <= TIME_TOLERANCE * (b - a):
+            return new if value >= second else None
+        value, its = quantity(new)
+        curvature = (its - slope) / (new - time)
+        time, slope = new, its
+    return None
 
 
 def searched_times(case: Case) -> list[float]:

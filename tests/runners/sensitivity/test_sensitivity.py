@@ -16,6 +16,7 @@ from ascentwind.runners.design.problem import LoadReliefProblem
 from ascentwind.runners.parameter_study import run_parameter_study
 from ascentwind.runners.sensitivity.check import central_difference
 from ascentwind.runners.sensitivity.one import UndefinedElasticityWarning
+from ascentwind.runners.sensitivity.peak import _from_parabola
 from ascentwind.runners.sensitivity.request import StructuralParameterError, TableParameterError, ZeroQuantityError
 
 
@@ -314,3 +315,20 @@ def test_nothing_follows_the_linear_mean_in_secret(cache, tmp_path):
     alone = study.response_statistics([30.0]).std
     across = {"response": ["bending_moment", "engine_angle"], "source": ["thrust", "center_of_pressure"]}
     np.testing.assert_allclose(member.sel(across).values, alone.sel(across).values, rtol=1e-4)
+
+
+def test_the_peak_is_found_from_three_values_about_it_in_few_steps():
+    """Of sin(t) + 0.1 t; a minimum is none, nor what lies below the value in the middle."""
+    asked = []
+
+    def quantity(time):
+        asked.append(time)
+        return np.sin(time) + 0.1 * time, np.cos(time) + 0.1
+
+    times = [1.0, 1.5, 2.5]
+    expected = np.arccos(-0.1)
+    found = _from_parabola(quantity, times, [quantity(t)[0] for t in times])
+    assert found == pytest.approx(expected, abs=1e-9)
+    assert len(asked) - len(times) <= 5
+    assert _from_parabola(quantity, [4.0, 4.6, 5.0], [quantity(t)[0] for t in (4.0, 4.6, 5.0)]) is None
+    assert _from_parabola(quantity, times, [1.0, 1.3, 0.9]) is None
