@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from ..case.case import Case
 
 TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
-REFERENCE_TOLERANCE = 1e-12
+REFERENCE_TOLERANCE = 1e-11  # a standard deviation is 8e-15 from that at 1e-12 for AS-504, 4e-13 for Falcon 1
 PRECISE = 1e-10  # of the adjoint that is taken apart into modes
 TYPICAL_ORDER = 5  # of the formulas, where the local error of each root is weighed
 
