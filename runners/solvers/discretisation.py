@@ -28,7 +28,7 @@ from .time_nodes import Interval, interval_before, intervals, time_nodes
 LARGEST_NORM = 1.0  # of an exponent whose series is summed; with TERMS terms it leaves 1e-13
 TERMS = 15
 MOST_SUBSTEPS = 200_000
-TOGETHER = 512  # substeps computed at once
+TOGETHER = 64  # substeps computed at once: their matrices stay in the second-level cache
 NOT_FINITE = (
     "the state matrix is not finite somewhere on this flight; see what divides by zero there, or which table holds an "
     "impossible value (see 'ascentwind inspect')"
