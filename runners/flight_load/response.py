@@ -18,14 +18,14 @@ from ..statistics.percentiles import Sides, instant_level
 from ..statistics.resultants import resultant_pairs
 from .norms import Norms
 from .process import JointOutputs, joint_covariance, joint_outputs
-from .window import window_chain
+from .window import PARTS, PartOfWindow, window_chain
 
 HALVINGS = 2  # from the grid of which paths are drawn to the one on which they are seen
 STEPS = 2400  # of the window at first; AS-504 in 60 s: 0.025 s
 MOST_STEPS = 9600  # of a part of it
 FINE = 0.025  # s, at most between the points at which a part is seen, at first
 SCOUTED = 600  # steps of the window between the times at which it is judged where a level is passed
-PARTS = 24  # of a window: what is drawn begins and ends with one, so that responses share the states there
+WIDEST = 2  # most steps of a part, as many times those of the window
 ROUNDING = 1e-9
 LEFT_OUT = 5e-5  # of the chance of the worst instant, at most, that all instants where no path is drawn have together
 
@@ -43,12 +43,15 @@ class ResponseInWindow:
         s.
     steps : int
         Of the window, on the grid on which paths are seen; a multiple of four.
+    part : PartOfWindow or None
+        Of a longer window, that it is.
     """
 
     case: Case
     response: str
     window: tuple[float, float]
     steps: int
+    part: PartOfWindow | None = None
 
     @property
     def outputs(self) -> tuple[str, ...]:
@@ -107,6 +110,8 @@ class ResponseInWindow:
     @property
     def chain(self) -> MarkovChain:
         """The states at the times at which paths are seen."""
+        if self.part is not None:
+            return self.part.chain(self.case)
         return window_chain(self.case, self.window, self.steps, TOLERANCE)
 
     def near(self, probability: float, sides: Sides, sources: Sequence[int] | None = None) -> ResponseInWindow:
@@ -131,10 +136,14 @@ class ResponseInWindow:
         first, last = np.searchsorted(np.cumsum(beyond), rare), np.searchsorted(np.cumsum(beyond[::-1]), rare)
         scouted = SCOUTED // PARTS
         first, last = max(int(first) - 1, 0) // scouted, PARTS - max(int(last) - 1, 0) // scouted
-        part = tuple(float(time) for time in np.linspace(begin, end, PARTS + 1)[[first, last]])
         spacing = min(end - begin, FINE * STEPS) / self.steps
-        steps = 4 * int(np.ceil((part[1] - part[0]) / spacing / 4 - ROUNDING))
-        return replace(self, window=(part[0], part[1]), steps=min(steps, self.steps, MOST_STEPS))
+        each = 4 * int(np.ceil((end - begin) / PARTS / spacing / 4 - ROUNDING))
+        part = PartOfWindow(self.window, first, last, each)
+        steps = (last - first) * each
+        most = min(WIDEST * self.steps, MOST_STEPS)
+        if steps > most:  # a long part of a long window makes a chain of its own, with longer steps
+            return replace(self, window=part.span, steps=most)
+        return replace(self, window=part.span, steps=steps, part=part)
 
     def _beyond(
         self, mean: NDArray[np.float64], covariance: NDArray[np.float64], probability: float, sides: Sides

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,6 +15,7 @@ from ..solvers.markov_chain import MarkovChain
 from ..solvers.time_nodes import time_nodes
 
 MOST_KEPT = 4  # chains of a case: of both planes one is some 400 MB
+PARTS = 24  # of a window: what is drawn begins and ends with one, so that responses share the states there
 
 
 def checked_window(case: Case, window: tuple[float, float] | None) -> tuple[float, float]:
@@ -57,6 +60,80 @@ def window_chain(
     while len(kept) > MOST_KEPT:
         kept.pop(next(iter(kept)), None)  # asked for longest ago
     return found
+
+
+@dataclass(frozen=True)
+class PartOfWindow:
+    """Some of the equal parts of a window, one after another, each cut into as many steps.
+
+    Attributes
+    ----------
+    window : (float, float)
+        s.
+    first, last : int
+        The first of the :data:`PARTS`, and the one after the last.
+    steps : int
+        Of each.
+    """
+
+    window: tuple[float, float]
+    first: int
+    last: int
+    steps: int
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """Where it begins and ends, s."""
+        begin, end = np.linspace(*self.window, PARTS + 1)[[self.first, self.last]].tolist()
+        return begin, end
+
+    def chain(self, case: Case) -> MarkovChain:
+        """Return the states of a case as a chain over it, cut out of one over all that were asked for so far.
+
+        The sweep is what a chain costs, and one serves all responses and levels.
+
+        Raises
+        ------
+        IntegrationError, DataError
+        """
+        kept: dict[tuple, _Longest] = case.kept("chains over parts of windows", dict)
+        question = self.window, self.steps
+        longest = kept.pop(question, None)
+        if longest is None or not longest.holds(self):
+            longest = self._longest(case, longest)
+        kept[question] = longest
+        while len(kept) > MOST_KEPT:
+            kept.pop(next(iter(kept)), None)  # asked for longest ago
+        return longest.cut(self)
+
+    def _longest(self, case: Case, known: _Longest | None) -> _Longest:
+        first = self.first if known is None else min(self.first, known.first)
+        last = self.last if known is None else max(self.last, known.last)
+        times = np.linspace(*self.window, PARTS * self.steps + 1)[first * self.steps : last * self.steps + 1]
+        chain = _chain(case, times, TOLERANCE)
+        starts, P = {first: chain.start}, chain.start
+        for step, (Phi, Q) in enumerate(zip(chain.transition, chain.added, strict=True), start=1):
+            P = Phi @ P @ Phi.T + Q
+            if step % self.steps == 0:
+                starts[first + step // self.steps] = P
+        return _Longest(first, last, chain, starts)
+
+
+@dataclass(frozen=True, eq=False)
+class _Longest:
+    """A chain over some of the parts of a window, and the covariance of the states at the begin of each."""
+
+    first: int
+    last: int
+    chain: MarkovChain
+    starts: dict[int, NDArray[np.float64]]
+
+    def holds(self, part: PartOfWindow) -> bool:
+        return self.first <= part.first and part.last <= self.last
+
+    def cut(self, part: PartOfWindow) -> MarkovChain:
+        points = slice((part.first - self.first) * part.steps, (part.last - self.first) * part.steps + 1)
+        return self.chain.part(points, self.starts[part.first])
 
 
 def _chain(case: Case, times: NDArray[np.float64], relative_tolerance: float) -> MarkovChain:

@@ -77,13 +77,14 @@ class MarkovChain:
             return self.noise_matrix
         return self.noise_matrix[:, :, np.isin(self.noise_source, list(sources))]
 
-    def part(self, points: slice) -> MarkovChain:
-        """Return the chain over consecutive times."""
+    def part(self, points: slice, start: NDArray[np.float64] | None = None) -> MarkovChain:
+        """Return the chain over consecutive times, with the covariance of the states at the first where it is known."""
         first, last, _ = points.indices(self.times.size)
         steps = slice(first, last - 1)
-        start = self.start
-        for Phi, Q in zip(self.transition[:first], self.added[:first], strict=True):
-            start = Phi @ start @ Phi.T + Q
+        if start is None:
+            start = self.start
+            for Phi, Q in zip(self.transition[:first], self.added[:first], strict=True):
+                start = Phi @ start @ Phi.T + Q
         return MarkovChain(
             self.times[points],
             self.transition[steps],
