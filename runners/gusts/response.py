@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from itertools import pairwise
 
 import numpy as np
 import xarray as xr
@@ -19,7 +18,7 @@ from .shapes import Gust, GustError, checked_gust
 from .weights import WindWeights, wind_weights
 
 # s and points of the weights, at most, of a panel in which the product is integrated as a polynomial of degree 11
-PANEL, POINTS = 0.05, 10
+PANEL, POINTS = 0.05, 7
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(6)
 
 
@@ -41,29 +40,21 @@ def gust_products(weights: WindWeights, climb: Climb, gust: Gust, starts: NDArra
     corners = climb.time_at(starts[:, None] + np.array(gust.corners))
     if gust.holds:
         corners = np.append(corners, np.full((starts.size, 1), weights.time), axis=1)
+    cut = np.clip(corners[:, :, None], weights.edges[:-1], weights.edges[1:])
+    begin, end = cut[:, :-1], cut[:, 1:]
+    row, pair, piece = np.nonzero(end > begin)
+    begin, span = begin[row, pair, piece], (end - begin)[row, pair, piece]
+    # each of these, where wind and weights are smooth, is cut into panels
+    panels = np.maximum(1, np.ceil(span / weights.panels(PANEL, POINTS)[piece] - 1e-9).astype(int))
+    of = np.repeat(np.arange(row.size), panels)
+    number = np.arange(of.size) - (np.cumsum(panels) - panels)[of]
+    width, row = (span / panels)[of], row[of]
+    times = (begin[of] + number * width)[:, None] + width[:, None] * (0.5 * (1 + NODES))
+    wind = gust.at(climb.altitude(times) - starts[row, None]) * (0.5 * width[:, None] * WEIGHTS)
     found = np.zeros((starts.size, weights.direct.size))
-    for spline, low, high in zip(weights.pieces, weights.edges[:-1], weights.edges[1:], strict=True):
-        cut, points = np.clip(corners, low, high), spline.t[(spline.t >= low) & (spline.t <= high)]
-        panel = min(PANEL, POINTS * float(np.diff(points).max(initial=0.0)) or PANEL)
-        for begin, end in pairwise(cut.T):
-            found += _integral(spline, climb, gust, starts, begin, end, panel)
+    np.add.at(found, row, np.matmul(wind[:, None, :], weights.polynomial(times))[:, 0])
     now = gust.at(climb.altitude(weights.time) - starts)
     return found + now[:, None] * weights.direct
-
-
-def _integral(spline, climb: Climb, gust: Gust, starts: NDArray, begin: NDArray, end: NDArray, panel: float) -> NDArray:
-    """Return the integral of wind times weights from begin to end (s), (p, r), where both are smooth."""
-    met = np.flatnonzero(end > begin)
-    if not met.size:
-        return np.zeros((starts.size, spline.c.shape[1]))
-    begin, span = begin[met], (end - begin)[met]
-    panels = max(1, int(np.ceil(float(span.max()) / panel - 1e-9)))
-    offsets = ((np.arange(panels)[:, None] + 0.5 * (1 + NODES)) / panels).ravel()
-    times = begin[:, None] + span[:, None] * offsets
-    wind = gust.at(climb.altitude(times) - starts[met, None]) * np.tile(0.5 / panels * WEIGHTS, panels)
-    found = np.zeros((starts.size, spline.c.shape[1]))
-    found[met] = span[:, None] * np.matmul(wind[:, None, :], spline(times))[:, 0]
-    return found
 
 
 def check_length(climb: Climb, length: float) -> None:

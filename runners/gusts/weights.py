@@ -9,11 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
+from math import factorial
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import BSpline, make_interp_spline
+from scipy.interpolate import BSpline, PPoly, make_interp_spline
 
 from ...codegen.system.evaluation import MatrixEvaluator
 from ..case.case import Case
@@ -54,6 +56,27 @@ class WindWeights:
     def begin(self) -> float:
         """Where they begin, s."""
         return float(self.edges[0])
+
+    @cached_property
+    def polynomial(self) -> PPoly:
+        """g(t2, t), (..., r), as one for all times between ``begin`` and t2 at which it does not jump."""
+        breaks, parts = [self.edges[:1]], []
+        for spline in dict.fromkeys(self.pieces):
+            knots = np.unique(spline.t)
+            powers = [spline(knots[:-1], k) / factorial(k) for k in range(spline.k, -1, -1)]
+            parts.append(np.pad(powers, ((DEGREE - spline.k, 0), (0, 0), (0, 0))))
+            breaks.append(knots[1:])
+        if not parts:
+            return PPoly(np.zeros((1, 1, self.direct.size)), self.edges[0] + np.array([0.0, 1.0]))
+        return PPoly(np.concatenate(parts, axis=1), np.concatenate(breaks))
+
+    def panels(self, longest: float, points: int) -> NDArray[np.float64]:
+        """Return what to integrate at once of each piece, s: so many of its points at most, and ``longest`` (s)."""
+        found = []
+        for spline, low, high in zip(self.pieces, self.edges[:-1], self.edges[1:], strict=True):
+            knots = spline.t[(spline.t >= low) & (spline.t <= high)]
+            found.append(min(longest, points * float(np.diff(knots).max(initial=0.0)) or longest))
+        return np.array(found)
 
     def at(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return g(t2, t) at times (k,) between ``begin`` and t2, from the left where it jumps, (k, r)."""

@@ -81,15 +81,16 @@ class MarkovChain:
         """Return the chain over consecutive times, with the covariance of the states at the first where it is known."""
         first, last, _ = points.indices(self.times.size)
         steps = slice(first, last - 1)
-        if start is None:
-            start = self.start
+        P = start
+        if P is None:
+            P = self.start
             for Phi, Q in zip(self.transition[:first], self.added[:first], strict=True):
-                start = Phi @ start @ Phi.T + Q
+                P = Phi @ P @ Phi.T + Q
         return MarkovChain(
             self.times[points],
             self.transition[steps],
             self.added[steps],
-            start,
+            P,
             self.state_matrix[points],
             self.noise_matrix[points],
             self.noise_source,
