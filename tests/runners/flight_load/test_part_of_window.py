@@ -10,9 +10,10 @@ from scipy.stats import norm
 
 from ascentwind.model import define_system
 from ascentwind.runners import Study
+from ascentwind.runners.flight_load import window
 from ascentwind.runners.flight_load.process import joint_covariance
 from ascentwind.runners.flight_load.response import LEFT_OUT, ResponseInWindow
-from ascentwind.runners.flight_load.window import window_chain
+from ascentwind.runners.flight_load.window import PARTS, PartOfWindow, window_chain
 
 
 def humps(*spans: tuple[float, float, float], rest: float = 0.01) -> Study:
@@ -54,6 +55,26 @@ def test_what_is_left_out_is_rare():
     beyond = norm.sf(level / np.where((seen >= 30.0) & (seen < 60.0), 1.0, 0.5))
     outside = (seen < begin) | (seen > end)
     assert beyond[outside].sum() <= 4 * LEFT_OUT * beyond.max()  # four times as many instants as are scouted
+
+
+def test_parts_are_cut_out_of_one_chain_and_are_as_chains_of_their_own(monkeypatch):
+    study, made, whole = humps((10.0, 40.0, 1.0), (30.0, 60.0, 2.0)), [], (0.0, 100.0)
+
+    def counted(case, times, relative_tolerance):
+        made.append((times[0], times[-1]))
+        return made_of(case, times, relative_tolerance)
+
+    made_of = window._chain
+    monkeypatch.setattr(window, "_chain", counted)
+    parts = [PartOfWindow(whole, first, last, 12) for first, last in ((4, 6), (2, 5), (3, 6), (9, 11), (7, 8))]
+    chains = [part.chain(study) for part in parts]
+    edges = np.linspace(*whole, PARTS + 1)
+    np.testing.assert_allclose(made, [(edges[first], edges[last]) for first, last in ((4, 6), (2, 6), (2, 11))])
+    for part, chain in zip(parts, chains, strict=True):
+        own = window_chain(study, part.span, 12 * (part.last - part.first))
+        np.testing.assert_allclose(chain.times, own.times, rtol=1e-13)
+        np.testing.assert_allclose(chain.covariance([1]), own.covariance([1]), rtol=1e-6, atol=1e-9)
+        np.testing.assert_allclose(chain.output, own.output, rtol=1e-9)
 
 
 @pytest.mark.slow
