@@ -15,12 +15,12 @@ from matplotlib.artist import Artist
 from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.image import imsave
 from matplotlib.text import Text
 from matplotlib.ticker import FixedFormatter, FuncFormatter
 
 from ...model.system.names import COMBINED, file_name
 from .files import write_whole
-from .png import png
 
 PIXELS = 150  # an inch, of PNG files
 TITLE_WIDTH = 76  # characters across a figure of 8 inches
@@ -78,8 +78,11 @@ def write_figure(figure: matplotlib_figure.Figure, folder: Path, name: str) -> l
             figure.set_layout_engine("none")
         _keep_legends(figure)
         canvas.draw()
-        image = png(np.asarray(canvas.buffer_rgba()), PIXELS)
-        drawn = write_whole(folder / f"{name}.png", lambda p: p.write_bytes(image))
+        image = np.asarray(canvas.buffer_rgba())
+        fast = {"compress_level": 1}  # no larger than at the highest by a fifth
+        drawn = write_whole(
+            folder / f"{name}.png", lambda p: imsave(str(p), image, format="png", dpi=PIXELS, pil_kwargs=fast)
+        )
         _keep_labels(figure)
         svg = write_whole(
             folder / f"{name}.svg", lambda p: FigureCanvasSVG(figure).print_svg(str(p), metadata={"Date": None})

@@ -8,7 +8,6 @@ from matplotlib import rc_context
 from matplotlib.text import Annotation
 from PIL import Image
 
-from ascentwind.runners.present.png import png
 from ascentwind.runners.present.style import PIXELS, STYLE, Figure, write_figure
 
 
@@ -34,13 +33,15 @@ def test_a_png_is_what_savefig_draws(tmp_path, anchor):
     png_file, _ = write_figure(figure_of(anchor), tmp_path, "once")
     other = figure_of(anchor)
     left = other.axes[0]
-    for text in (left.title, *left.get_legend().get_texts(), *left.texts):
+    legend = left.get_legend()
+    assert legend is not None
+    for text in (left.title, *legend.get_texts(), *left.texts):
         text.set_parse_math(False)
     with rc_context(STYLE):
         other.savefig(tmp_path / "other.png", dpi=PIXELS)
     with Image.open(png_file) as mine, Image.open(tmp_path / "other.png") as its:
         assert mine.info["dpi"] == pytest.approx((PIXELS, PIXELS), rel=1e-4)
-        np.testing.assert_array_equal(np.asarray(mine), np.asarray(its)[:, :, :3])
+        np.testing.assert_array_equal(np.asarray(mine), np.asarray(its))
 
 
 def test_an_svg_is_the_same_again(tmp_path):
@@ -54,17 +55,8 @@ def test_dollars_are_kept_and_powers_of_ten_are_not(tmp_path):
     write_figure(figure, tmp_path, "dollars")
     left, right = figure.axes
     notes = [text for text in left.texts if isinstance(text, Annotation)]
-    kept = [left.title, left.xaxis.label, *left.get_legend().get_texts(), *notes]
+    legend = left.get_legend()
+    assert legend is not None
+    kept = [left.title, left.xaxis.label, *legend.get_texts(), *notes]
     assert notes and not any(text.get_parse_math() for text in kept)
     assert all(label.get_parse_math() for label in right.get_xticklabels())
-
-
-@pytest.mark.parametrize("shape", [(3, 5, 4), (1, 1, 3), (40, 7, 3)])
-def test_a_png_holds_the_pixels_that_it_was_given(tmp_path, shape):
-    image = np.random.default_rng(1).integers(0, 256, shape, np.uint8)
-    file = tmp_path / "image.png"
-    file.write_bytes(png(image, 150))
-    with Image.open(file) as read:
-        read.load()
-        assert read.mode == "RGB"
-        np.testing.assert_array_equal(np.asarray(read), image[:, :, :3])
