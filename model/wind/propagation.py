@@ -29,18 +29,17 @@ def transitions(shaping_filter: ShapingFilter, edges: NDArray[np.float64]) -> tu
     """
     step = np.diff(edges)[:, None, None]
     middle, n = 0.5 * (edges[:-1] + edges[1:]), shaping_filter.order
-    blocks = []
-    for side in (-GAUSS, GAUSS):
-        F, G, _ = shaping_filter.at(middle + side * step[:, 0, 0])
-        block = np.zeros((middle.size, 2 * n, 2 * n))
-        block[:, :n, :n], block[:, :n, n:], block[:, n:, n:] = F, G @ G.swapaxes(1, 2), -F.swapaxes(1, 2)
-        blocks.append(block)
+    sides = [shaping_filter.at(middle + side * step[:, 0, 0])[:2] for side in (-GAUSS, GAUSS)]
+    F, added = np.array([F for F, _ in sides]), np.array([G @ G.swapaxes(1, 2) for _, G in sides])
+    size = float(np.abs(added).max()) / (float(np.abs(F).max()) or 1.0) or 1.0  # any unit of states will do
+    blocks = np.zeros((2, middle.size, 2 * n, 2 * n))
+    blocks[..., :n, :n], blocks[..., :n, n:], blocks[..., n:, n:] = F, added / size, -F.swapaxes(-1, -2)
     first, second = blocks
     exponential = exponentials(
         0.5 * step * (first + second) + np.sqrt(3) / 12 * step**2 * (second @ first - first @ second)
     )
     phi = exponential[:, :n, :n]
-    return phi, exponential[:, :n, n:] @ phi.swapaxes(1, 2)
+    return phi, size * exponential[:, :n, n:] @ phi.swapaxes(1, 2)
 
 
 def exponentials(X: NDArray[np.float64]) -> NDArray[np.float64]:

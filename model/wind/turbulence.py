@@ -143,16 +143,16 @@ def turbulence_filter(
     low, high = altitude
     if not high > low:
         raise DataError(f"turbulence from {low:g} to {high:g} m has no range; give the lower altitude first")
-    if high_pass is not None and not high_pass > 0:
-        raise DataError(f"a high pass at a wavelength of {high_pass:g} m is not possible; give a positive one")
+    if high_pass is not None and not 0 < high_pass < np.inf:
+        raise DataError(f"a high pass at a wavelength of {high_pass:g} m is not possible; give a positive one, or none")
     table = intensity if intensity is not None else turbulence_intensity(severity)
     corners = [x for x in table.argument if low < x < high] if table.interpolation == "linear" else []
     h = np.unique(np.concatenate([np.arange(low, high, SPACING), [high], corners]))
     h = h[np.concatenate([[True], np.diff(h) > 1e-6])]
     sigma = table.polynomial(np.clip(h, table.argument[0], table.argument[-1]))
     scale = np.asarray(length(h) if callable(length) else np.full(h.size, float(length)), float)
-    if not (scale > 0).all() or (sigma < 0).any():
-        raise DataError("turbulence needs positive length scales and intensities that are not negative")
+    if not ((scale > 0) & (scale < np.inf)).all() or (sigma < 0).any():
+        raise DataError("turbulence needs positive, finite length scales and intensities that are not negative")
     A, B, C = realisation(form)
     n = A.shape[0] + (high_pass is not None)
     F, G, H = np.zeros((h.size, n, n)), np.zeros((h.size, n, 1)), np.zeros((h.size, n))

@@ -53,8 +53,9 @@ def _carried(shaping_filter: ShapingFilter, start: NDArray[np.float64], low: flo
             finer = [P]
             for k, before in enumerate(coarser):  # the errors of symmetric steps: of orders 4, 6, 8 ...
                 finer.append(finer[-1] + (finer[-1] - before) / (2.0 ** (4 + 2 * k) - 1))
-        deviation = np.sqrt(np.maximum(np.diag(finer[-1]), 0.0))
-        if coarser and (np.abs(finer[-1] - coarser[-1]) <= ACCURACY * np.outer(deviation, deviation)).all():
-            return finer[-1]
+        for better, before in zip(finer[:0:-1], coarser[::-1], strict=True):  # steps far too long spoil the last alone
+            deviation = np.sqrt(np.maximum(np.maximum(np.diag(better), np.diag(start)), 0.0))
+            if (np.abs(better - before) <= ACCURACY * np.outer(deviation, deviation)).all():
+                return better
         coarser = finer
     raise StepBudgetError(2**MOST_HALVINGS, f"an altitude of {low:.4g} m of the wind filter")

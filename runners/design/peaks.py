@@ -109,7 +109,8 @@ class TrialPeaks:
         if exact is None or on_grid is None:
             return exact, 0.0
         before, self._missing = self._missing, exact - on_grid
-        moved = np.abs(self._missing - before) / np.abs(exact).max(axis=(1, 2), keepdims=True)
+        largest = np.abs(exact).max(axis=(1, 2), keepdims=True)
+        moved = np.abs(self._missing - before) / np.where(largest > 0, largest, 1.0)
         return exact, float(moved.max())
 
     def leave_grid(self) -> None:

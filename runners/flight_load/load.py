@@ -34,13 +34,13 @@ from .pathwise import Movement, Reaching, movement, reaching
 from .probability import Estimate, Level, estimate, find_level
 from .process import ManyOutputs
 from .request import SpacingWarning, checked_draws, checked_level, refuse_without_variance
-from .response import HALVINGS, MOST_STEPS, STEPS, ResponseInWindow, squared_diffusion
+from .response import HALVINGS, STEPS, ResponseInWindow, squared_diffusion
 from .sampling import draw_beyond, instant_levels, sighted_steps, steps_near
 from .sensitivity import level_sensitivity
 from .uncertain_parameter import checked_spread, processes_of, uncertain_level
 from .upcrossings import upcrossing_rate
 from .wind_interval import wind_interval_of
-from .window import checked_window
+from .window import MOST_STEPS, checked_window
 
 SPACING_ERROR = 0.02  # relative, of a probability; finer where it is larger
 FREEDOM = 0.03  # of a variance

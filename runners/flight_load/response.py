@@ -18,11 +18,10 @@ from ..statistics.percentiles import Sides, instant_level
 from ..statistics.resultants import resultant_pairs
 from .norms import Norms
 from .process import JointOutputs, joint_covariance, joint_outputs
-from .window import PARTS, PartOfWindow, window_chain
+from .window import MOST_STEPS, PARTS, PartOfWindow, window_chain
 
 HALVINGS = 2  # from the grid of which paths are drawn to the one on which they are seen
 STEPS = 2400  # of the window at first; AS-504 in 60 s: 0.025 s
-MOST_STEPS = 9600  # of a part of it
 FINE = 0.025  # s, at most between the points at which a part is seen, at first
 SCOUTED = 600  # steps of the window between the times at which it is judged where a level is passed
 WIDEST = 2  # most steps of a part, as many times those of the window

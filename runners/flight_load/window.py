@@ -15,6 +15,8 @@ from ..solvers.markov_chain import MarkovChain
 from ..solvers.time_nodes import time_nodes
 
 MOST_KEPT = 4  # chains of a case: of both planes one is some 400 MB
+MOST_STEPS = 9600  # of a part of a window, and of several in one chain
+SPREAD = 2  # parts in one chain, at most, as many times those that were asked for
 PARTS = 24  # of a window: what is drawn begins and ends with one, so that responses share the states there
 
 
@@ -97,18 +99,23 @@ class PartOfWindow:
         IntegrationError, DataError
         """
         kept: dict[tuple, _Longest] = case.kept("chains over parts of windows", dict)
-        question = self.window, self.steps
-        longest = kept.pop(question, None)
-        if longest is None or not longest.holds(self):
-            longest = self._longest(case, longest)
-        kept[question] = longest
+        alike = [key for key in kept if key[:2] == (self.window, self.steps)]
+        key = next((key for key in alike if kept[key].holds(self)), None)
+        longest = self._longest(case, kept, alike) if key is None else kept.pop(key)
+        kept[self.window, self.steps, longest.first, longest.last] = longest
         while len(kept) > MOST_KEPT:
             kept.pop(next(iter(kept)), None)  # asked for longest ago
         return longest.cut(self)
 
-    def _longest(self, case: Case, known: _Longest | None) -> _Longest:
-        first = self.first if known is None else min(self.first, known.first)
-        last = self.last if known is None else max(self.last, known.last)
+    def _longest(self, case: Case, kept: dict[tuple, _Longest], alike: list[tuple]) -> _Longest:
+        first, last = self.first, self.last
+        for key in reversed(alike):
+            known = kept[key]
+            begin, end = min(first, known.first), max(last, known.last)
+            most = min(SPREAD * (last - first + known.last - known.first), MOST_STEPS // self.steps)
+            if end - begin <= most:  # else they lie too far apart for what is between
+                kept.pop(key)
+                first, last = begin, end
         times = np.linspace(*self.window, PARTS * self.steps + 1)[first * self.steps : last * self.steps + 1]
         chain = _chain(case, times, TOLERANCE)
         starts, P = {first: chain.start}, chain.start

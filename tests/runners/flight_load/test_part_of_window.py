@@ -70,6 +70,13 @@ def test_parts_are_cut_out_of_one_chain_and_are_as_chains_of_their_own(monkeypat
     chains = [part.chain(study) for part in parts]
     edges = np.linspace(*whole, PARTS + 1)
     np.testing.assert_allclose(made, [(edges[first], edges[last]) for first, last in ((4, 6), (2, 6), (2, 11))])
+    for first, last in ((1, 2), (20, 21), (2, 4), (20, 21)):
+        PartOfWindow(whole, first, last, 16).chain(study)
+    apart = [(edges[first], edges[last]) for first, last in ((1, 2), (20, 21), (1, 4))]  # without what lies between
+    np.testing.assert_allclose(made[3:], apart)
+    assert PartOfWindow(whole, 0, 24, 500).chain(study).times.size == 12001
+    PartOfWindow(whole, 3, 4, 500).chain(study)
+    assert len(made) == 7
     for part, chain in zip(parts, chains, strict=True):
         own = window_chain(study, part.span, 12 * (part.last - part.first))
         np.testing.assert_allclose(chain.times, own.times, rtol=1e-13)
