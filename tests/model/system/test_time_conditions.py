@@ -16,8 +16,8 @@ from switched_system import NOMINAL, pieces, switched_system
 
 from ascentwind.model import LinearSystem, define_system
 from ascentwind.model.errors import IntegrationError, NonlinearSystemError, SwitchError
-from ascentwind.model.system.interval_arithmetic import bounds
 from ascentwind.model.polynomials import PiecewisePolynomial
+from ascentwind.model.system.interval_arithmetic import bounds
 from ascentwind.model.tables import TableGroup
 from ascentwind.runners import CovarianceEquation, Cvodes, Study, Sweep
 from ascentwind.runners.solvers.discretisation import discretise
@@ -274,13 +274,8 @@ def test_a_hundred_switches_a_second():
 def test_a_condition_on_a_table_stands_in_outputs_alone():
     """y = h(t) x, h = 2 where a table exceeds 2, else 1: nothing is integrated over it."""
     x, n, v = ca.SX.sym("x"), ca.SX.sym("n"), ca.SX.sym("v")
-    table = TableGroup.from_polynomials(
-        "height",
-        "time",
-        (("height", "m", PiecewisePolynomial(np.array([[1.0], [0.0]]), np.array([0.0, 9.0]))),),
-        0.0,
-        9.0,
-    )
+    rising = PiecewisePolynomial(np.array([[1.0], [0.0]]), np.array([0.0, 9.0]))
+    table = TableGroup.from_polynomials("height", "time", (("height", "m", rising),), 0.0, 9.0)
     above = define_system("above", time=T, states={"x": (x, -x + n)}, noises={"n": n}, outputs={"x": x}, end=9.0)
     system = replace(above, v=v, tables=(table,), output=(1 + (v > 2.0)) * x)
     assert not system.conditions
