@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import islice
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +15,8 @@ from ..case.chain import TOLERANCE, chain_at
 from ..case.times import parse_times, seconds
 from ..solvers.markov_chain import MarkovChain
 from ..solvers.time_nodes import time_nodes
+
+T = TypeVar("T")
 
 MOST_KEPT = 4  # chains of a case: of both planes one is some 400 MB
 MOST_STEPS = 9600  # of a part of a window, and of several in one chain
@@ -58,10 +62,15 @@ def window_chain(
     kept: dict[tuple, MarkovChain] = case.kept("chains over windows", dict)
     question = window, steps, relative_tolerance
     found = kept.pop(question, None) or _chain(case, times, relative_tolerance)
+    _keep(kept, question, found)
+    return found
+
+
+def _keep(kept: dict[tuple, T], question: tuple, found: T) -> None:
+    """Keep a chain as the one asked for last, and no more than a few."""
     kept[question] = found
     while len(kept) > MOST_KEPT:
         kept.pop(next(iter(kept)), None)  # asked for longest ago
-    return found
 
 
 @dataclass(frozen=True)
@@ -102,9 +111,7 @@ class PartOfWindow:
         alike = [key for key in kept if key[:2] == (self.window, self.steps)]
         key = next((key for key in alike if kept[key].holds(self)), None)
         longest = self._longest(case, kept, alike) if key is None else kept.pop(key)
-        kept[self.window, self.steps, longest.first, longest.last] = longest
-        while len(kept) > MOST_KEPT:
-            kept.pop(next(iter(kept)), None)  # asked for longest ago
+        _keep(kept, (self.window, self.steps, longest.first, longest.last), longest)
         return longest.cut(self)
 
     def _longest(self, case: Case, kept: dict[tuple, _Longest], alike: list[tuple]) -> _Longest:
@@ -118,29 +125,24 @@ class PartOfWindow:
                 first, last = begin, end
         times = np.linspace(*self.window, PARTS * self.steps + 1)[first * self.steps : last * self.steps + 1]
         chain = _chain(case, times, TOLERANCE)
-        starts, P = {first: chain.start}, chain.start
-        for step, (Phi, Q) in enumerate(zip(chain.transition, chain.added, strict=True), start=1):
-            P = Phi @ P @ Phi.T + Q
-            if step % self.steps == 0:
-                starts[first + step // self.steps] = P
-        return _Longest(first, last, chain, starts)
+        return _Longest(first, last, chain, tuple(islice(chain.source_covariances(), 0, None, self.steps)))
 
 
 @dataclass(frozen=True, eq=False)
 class _Longest:
-    """A chain over some of the parts of a window, and the covariance of the states at the begin of each."""
+    """A chain over some of the parts of a window, and the covariances of the states at their edges."""
 
     first: int
     last: int
     chain: MarkovChain
-    starts: dict[int, NDArray[np.float64]]
+    starts: tuple[NDArray[np.float64], ...]
 
     def holds(self, part: PartOfWindow) -> bool:
         return self.first <= part.first and part.last <= self.last
 
     def cut(self, part: PartOfWindow) -> MarkovChain:
         points = slice((part.first - self.first) * part.steps, (part.last - self.first) * part.steps + 1)
-        return self.chain.part(points, self.starts[part.first])
+        return self.chain.part(points, self.starts[part.first - self.first])
 
 
 def _chain(case: Case, times: NDArray[np.float64], relative_tolerance: float) -> MarkovChain:

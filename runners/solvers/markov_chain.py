@@ -8,9 +8,9 @@ compiled.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import islice, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,20 +77,25 @@ class MarkovChain:
             return self.noise_matrix
         return self.noise_matrix[:, :, np.isin(self.noise_source, list(sources))]
 
+    def source_covariances(self) -> Iterator[NDArray[np.float64]]:
+        """Give the covariances of the states by source, (sources, n, n), at one time after another."""
+        P = self.start
+        yield P
+        for Phi, Q in zip(self.transition, self.added, strict=True):
+            P = Phi @ P @ Phi.T + Q
+            yield P
+
     def part(self, points: slice, start: NDArray[np.float64] | None = None) -> MarkovChain:
-        """Return the chain over consecutive times, with the covariance of the states at the first where it is known."""
+        """Return the chain over consecutive times; the covariances at the first are found where they are not given."""
         first, last, _ = points.indices(self.times.size)
         steps = slice(first, last - 1)
-        P = start
-        if P is None:
-            P = self.start
-            for Phi, Q in zip(self.transition[:first], self.added[:first], strict=True):
-                P = Phi @ P @ Phi.T + Q
+        if start is None:
+            start = next(islice(self.source_covariances(), first, None))
         return MarkovChain(
             self.times[points],
             self.transition[steps],
             self.added[steps],
-            P,
+            start,
             self.state_matrix[points],
             self.noise_matrix[points],
             self.noise_source,
